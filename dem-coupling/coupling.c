@@ -1,0 +1,681 @@
+// coupling.c: the time loop's door to the discrete elements: scales between a metre of width and real spheres, keeps
+// what LIGGGHTS does not know of grains (parcel mass, forces), and tells it of releases, deposits and the bed's surface
+#include "state.h"
+
+static const double parcel_least = 0.4, parcel_most = 2.0; // radii of parcels in contact, times that of grains.parcel
+static const double parcel_usual = 0.75;                   // radius that the time step is chosen for
+static const double clump_spacing = 0.3;                   // between a body's spheres, times their radius
+static const double room_overlap = 0.01;                   // of the radius
+static const double period_share = 3.2;                    // slab thickness over the largest sphere's diameter
+
+static void coupling_close(silt_coupling **coupling);
+
+// ---------------------------------------------------------------- sizes
+
+static double coupling_sphere_density(const silt_coupling *c, double mass, double radius) {
+    return mass * c->width / (4.0 / 3.0 * M_PI * radius * radius * radius);
+}
+
+static double coupling_rayleigh(const silt_contact_def *contact, double radius, double density) {
+    return silt_dem_rayleigh(radius, density, contact->youngs_modulus, contact->poissons_ratio);
+}
+
+// a crumb of the bed becomes a sphere that the time step can bear: larger than its mass asks for, see coupling_burden
+static double coupling_parcel_radius(const silt_coupling *c, double mass) {
+    double radius = cbrt(6.0 * c->width * mass / c->scene->bed.density / M_PI) / 2.0;
+    return silt_max(radius, parcel_least * c->parcel);
+}
+
+// mass of the sphere over the mass that it stands for in the slab: 1, more for a crumb; forces on it are scaled alike,
+// so that it moves as the crumb would
+static double coupling_burden(const silt_coupling *c, const coupling_grain *g) {
+    double crumb = parcel_least * c->parcel;
+    if (c->parcel <= 0.0 || g->radius > crumb)
+        return 1.0;
+    double sphere = 4.0 / 3.0 * M_PI * crumb * crumb * crumb * g->mass / g->solid;
+    return silt_max(1.0, sphere / (g->mass * c->width));
+}
+
+// bodies' outlines and clumps, per metre of width
+static silt_status coupling_shapes(silt_coupling *c, silt_error *err) {
+    const silt_scene *scene = c->scene;
+    size_t n = (size_t)scene->n_body;
+    c->body = silt_alloc(n, sizeof *c->body);
+    c->body_force = silt_alloc(3 * n, sizeof(double));
+    c->body_torque = silt_alloc(3 * n, sizeof(double));
+    c->bodies = silt_alloc(1, sizeof *c->bodies);
+    c->bodies->body = silt_alloc(n, sizeof *c->bodies->body);
+    c->bodies->count = scene->n_body;
+    for (int i = 0; i < scene->n_body; i++) {
+        const silt_body_def *def = &scene->body[i];
+        coupling_body *body = &c->body[i];
+        struct silt_body *state = &c->bodies->body[i];
+        SILT_TRY(silt_outline_create(&body->shape, def, err));
+        silt_clump_create(&body->clump, &body->shape, 0.0, clump_spacing);
+        body->fixed = def->motion == MOTION_FIXED;
+        for (int k = 0; k < 2; k++) {
+            state->x[k] = def->at[k];
+            state->v[k] = body->fixed ? 0.0 : def->velocity[k];
+        }
+        state->q[0] = cos(def->angle * M_PI / 360.0);
+        state->q[3] = sin(def->angle * M_PI / 360.0);
+        state->mass = def->density * body->shape.area;
+        state->inertia = def->density * body->shape.inertia;
+        state->area = body->shape.area;
+        state->n_point = body->shape.n_point;
+        state->outline = body->shape.point;
+    }
+    return SILT_OK;
+}
+
+// widths, radii, time step and everything else that the worker is told once; walls are owned by the caller
+static void coupling_measure(silt_coupling *c, const silt_coupling_def *def, silt_dem_def *dem, double (**wall)[4]) {
+    const silt_scene *scene = c->scene;
+    const silt_contact_def *contact = &scene->contact;
+    const silt_grains_def *grains = &scene->grains;
+    double largest = 0.0, smallest = HUGE_VAL, clump = 0.0, listed = 0.0;
+    for (int i = 0; i < grains->n_grain; i++) {
+        listed = silt_max(listed, grains->grain[i].diameter);
+        smallest = silt_min(smallest, grains->grain[i].diameter / 2.0);
+    }
+    largest = listed / 2.0;
+    for (int i = 0; i < scene->n_body; i++) {
+        clump = silt_max(clump, c->body[i].clump.largest);
+        smallest = silt_min(smallest, c->body[i].clump.smallest);
+    }
+    largest = silt_max(largest, clump);
+    if (scene->bed.on) {
+        c->parcel = grains->parcel / 2.0;
+        c->crust = c->parcel > 0.0 ? silt_min(0.35 * scene->bed.size, c->parcel) : 0.35 * scene->bed.size;
+        largest = silt_max(largest, silt_max(parcel_most * c->parcel, c->crust));
+        smallest =
+            silt_min(smallest, c->parcel > 0.0 ? silt_min(parcel_least * c->parcel, 0.25 * c->crust) : 0.25 * c->crust);
+    }
+    if (!(largest > 0.0))
+        largest = smallest = scene->fluid.size > 0.0 ? scene->fluid.size : 0.01;
+
+    // physics: with the sphere's own diameter as width a random pack is too loose
+    double diameter = silt_max(listed, 2.0 * c->parcel);
+    c->width = grains->width;
+    if (!(c->width > 0.0)) {
+        if (c->parcel > 0.0)
+            c->width = 2.0 / 3.0 * 0.82 * 2.0 * c->parcel / (1.0 - scene->bed.porosity);
+        else
+            c->width = listed > 0.0 ? 5.0 * listed : 2.0 * largest;
+    }
+
+    // the stiffest sphere sets the time step; a body's spheres share its mass
+    double rayleigh = HUGE_VAL;
+    for (int i = 0; i < grains->n_grain; i++)
+        rayleigh =
+            silt_min(rayleigh, coupling_rayleigh(contact, grains->grain[i].diameter / 2.0, grains->grain[i].density));
+    if (c->parcel > 0.0)
+        rayleigh = silt_min(rayleigh, coupling_rayleigh(contact, parcel_usual * c->parcel, scene->bed.density));
+    for (int i = 0; i < scene->n_body; i++) {
+        const silt_clump *k = &c->body[i].clump;
+        double density = coupling_sphere_density(c, c->bodies->body[i].mass / k->n_sphere, k->largest);
+        if (!c->body[i].fixed)
+            rayleigh =
+                silt_min(rayleigh, coupling_rayleigh(contact, k->largest, silt_min(density, scene->body[i].density)));
+    }
+    if (rayleigh == HUGE_VAL)
+        rayleigh = coupling_rayleigh(contact, smallest, 1000.0);
+    c->step = contact->step * rayleigh;
+
+    c->exchange.law = grains->drag;
+    c->exchange.density = scene->fluid.density;
+    c->exchange.viscosity = scene->fluid.viscosity;
+    c->exchange.refresh = true;
+    for (int k = 0; k < 2; k++)
+        c->exchange.gravity[k] = scene->gravity[k];
+    c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
+
+    *wall = silt_alloc((size_t)c->walls->count, sizeof **wall);
+    for (int i = 0; i < c->walls->count; i++)
+        for (int k = 0; k < 2; k++) {
+            (*wall)[i][k] = c->walls->from[i][k];
+            (*wall)[i][2 + k] = c->walls->to[i][k];
+        }
+    *dem = (silt_dem_def){
+        .worker = def->worker,
+        .log = def->log,
+        .lo = {def->lo[0], def->lo[1]},
+        .hi = {def->hi[0], def->hi[1]},
+        .period = period_share * 2.0 * largest,
+        .gravity = {scene->gravity[0], scene->gravity[1], 0.0},
+        .youngs_modulus = contact->youngs_modulus,
+        .poissons_ratio = contact->poissons_ratio,
+        .restitution = contact->restitution,
+        .friction = contact->friction,
+        .rolling_friction = contact->rolling_friction,
+        .body_friction = contact->body_friction,
+        .step = c->step,
+        .n_wall = c->walls->count,
+        .wall = (const double(*)[4]) * wall,
+        .max_radius = largest,
+        .min_radius = smallest,
+    };
+}
+
+// ---------------------------------------------------------------- grains
+
+static coupling_grain *coupling_append(silt_coupling *c, const double x[2], const double v[2], double radius) {
+    SILT_RESERVE(c->grain, c->grain_capacity, c->n_grain + 1);
+    coupling_grain *g = &c->grain[c->n_grain++];
+    *g = (coupling_grain){.id = c->next_id++, .x = {x[0], x[1]}, .v = {v[0], v[1]}, .radius = radius};
+    return g;
+}
+
+// takes grains that are gone out of the list
+static void coupling_compact(silt_coupling *c) {
+    int kept = 0;
+    for (int i = 0; i < c->n_grain; i++)
+        if (!c->grain[i].gone)
+            c->grain[kept++] = c->grain[i];
+    c->n_grain = kept;
+}
+
+static void coupling_forget(void *context, int64_t id) {
+    silt_coupling *c = context;
+    SILT_RESERVE(c->drop, c->drop_capacity, c->n_drop + 1);
+    c->drop[c->n_drop++] = id;
+}
+
+static void coupling_take(silt_coupling *c, coupling_grain *g) {
+    g->gone = true;
+    if (g->sent)
+        coupling_forget(c, g->id);
+}
+
+static const silt_grain_state *coupling_grains(const silt_coupling *c) {
+    coupling_view *w = c->view;
+    int n = c->n_grain, count = 0;
+    SILT_RESERVE(w->id, w->capacity[0], n);
+    SILT_RESERVE(w->x, w->capacity[1], 3 * n);
+    SILT_RESERVE(w->v, w->capacity[2], 3 * n);
+    SILT_RESERVE(w->omega, w->capacity[3], 3 * n);
+    SILT_RESERVE(w->radius, w->capacity[4], n);
+    SILT_RESERVE(w->mass, w->capacity[5], n);
+    SILT_RESERVE(w->net, w->capacity[6], n);
+    SILT_RESERVE(w->contacts, w->capacity[7], n);
+    SILT_RESERVE(w->on_bed, w->capacity[8], n);
+    SILT_RESERVE(w->map, w->map_capacity, n);
+    for (int i = 0; i < n; i++) {
+        const coupling_grain *g = &c->grain[i];
+        if (g->gone)
+            continue;
+        w->id[count] = g->id;
+        memcpy(w->x + 3 * count, g->x, sizeof g->x);
+        memcpy(w->v + 3 * count, g->v, sizeof g->v);
+        memcpy(w->omega + 3 * count, g->omega, sizeof g->omega);
+        w->radius[count] = g->radius;
+        w->mass[count] = g->mass;
+        w->net[count] = g->net;
+        w->contacts[count] = g->contacts;
+        w->on_bed[count] = g->on_bed;
+        w->map[count++] = i;
+    }
+    w->state = (silt_grain_state){.count = count,
+                                  .id = w->id,
+                                  .x = w->x,
+                                  .v = w->v,
+                                  .omega = w->omega,
+                                  .radius = w->radius,
+                                  .mass = w->mass,
+                                  .contacts = w->contacts,
+                                  .on_bed = w->on_bed,
+                                  .net_force = w->net};
+    return &w->state;
+}
+
+static void coupling_release(silt_coupling *c, int n, const silt_release *release) {
+    const silt_scene *scene = c->scene;
+    for (int i = 0; i < n; i++) {
+        double radius = coupling_parcel_radius(c, release[i].mass);
+        if (!(radius <= parcel_most * c->parcel)) {
+            silt_fail(&c->refused, SILT_FAILED,
+                      "parcel released at (%g, %g): %g kg per metre make a radius of %g m, allowed: up to %g m (twice "
+                      "that of "
+                      "grains.parcel); make grains.parcel larger or bed.size smaller",
+                      release[i].x[0], release[i].x[1], release[i].mass, radius, parcel_most * c->parcel);
+            return;
+        }
+        coupling_grain *g = coupling_append(c, release[i].x, release[i].v, radius);
+        g->mass = release[i].mass;
+        g->solid = release[i].mass / scene->bed.density;
+        // drag sees the grains that the parcel stands for
+        g->diameter = scene->grains.diameter > 0.0 ? scene->grains.diameter : cbrt(6.0 * c->width * g->solid / M_PI);
+        g->number = g->solid / (M_PI / 6.0 * g->diameter * g->diameter * g->diameter);
+    }
+}
+
+static void coupling_deposit(silt_coupling *c, int grain) {
+    coupling_grain *g = &c->grain[c->view->map[grain]];
+    silt_frozen_add(&c->frozen, g->x, g->radius, &c->next_id);
+    coupling_take(c, g);
+}
+
+// ---------------------------------------------------------------- room
+
+// distance from a point to a body; beyond `far` only a lower bound of it
+static double coupling_body_distance(const silt_coupling *c, int i, const double x[2], double far) {
+    const struct silt_body *b = &c->bodies->body[i];
+    double d[2] = {x[0] - b->x[0], x[1] - b->x[1]}, bound = hypot(d[0], d[1]) - c->body[i].shape.radius;
+    if (bound > far)
+        return bound;
+    double angle = 2.0 * atan2(b->q[3], b->q[0]);
+    double local[2] = {cos(angle) * d[0] + sin(angle) * d[1], cos(angle) * d[1] - sin(angle) * d[0]};
+    return silt_outline_distance(&c->body[i].shape, local);
+}
+
+static double coupling_wall_distance(const silt_walls *walls, int i, const double x[2]) {
+    const double *a = walls->from[i], *b = walls->to[i];
+    double e[2] = {b[0] - a[0], b[1] - a[1]}, d[2] = {x[0] - a[0], x[1] - a[1]};
+    double t = silt_clamp((e[0] * d[0] + e[1] * d[1]) / (e[0] * e[0] + e[1] * e[1]), 0.0, 1.0);
+    return hypot(d[0] - t * e[0], d[1] - t * e[1]);
+}
+
+// free distance from a point to grains and bodies
+static double coupling_gap(const void *context, const double x[2]) {
+    const silt_coupling *c = context;
+    double gap = HUGE_VAL;
+    for (int i = 0; i < c->n_grain; i++)
+        if (!c->grain[i].gone)
+            gap = silt_min(gap, hypot(x[0] - c->grain[i].x[0], x[1] - c->grain[i].x[1]) - c->grain[i].radius);
+    for (int i = 0; i < c->bodies->count; i++)
+        gap = silt_min(gap, coupling_body_distance(c, i, x, gap));
+    return gap;
+}
+
+static bool coupling_room(const silt_coupling *c, const double x[2], double radius) {
+    double need = (1.0 - room_overlap) * radius;
+    if (coupling_gap(c, x) < need)
+        return false;
+    for (int i = 0; i < c->frozen.count; i++) {
+        const silt_frozen_sphere *s = &c->frozen.sphere[i];
+        if (hypot(x[0] - s->x[0], x[1] - s->x[1]) - s->radius < need)
+            return false;
+    }
+    for (int i = 0; i < c->walls->count; i++)
+        if (coupling_wall_distance(c->walls, i, x) < need)
+            return false;
+    return true;
+}
+
+static void coupling_bed_changed(silt_coupling *c, const silt_bed *bed) {
+    silt_frozen_update(&c->frozen, bed, c->crust, &c->next_id, coupling_gap, coupling_forget, c);
+}
+
+// ---------------------------------------------------------------- exchange with the water
+
+static silt_status coupling_prepare(silt_coupling *c, const silt_nodes *nodes, const silt_mesh *mesh, double dt,
+                                    const silt_drag **drag, silt_error *err) {
+    silt_exchange *e = &c->exchange;
+    *drag = NULL;
+    coupling_compact(c);
+    c->wet = false;
+    c->n_loaded = c->n_grain;
+    if (c->n_grain == 0 || nodes == NULL || mesh == NULL || mesh->n_cell == 0)
+        return SILT_OK;
+    silt_locator_build(&c->locator, mesh, nodes->x, c->scene->fluid.size);
+    SILT_RESERVE(e->grain, e->grain_capacity, c->n_grain);
+    e->n_grain = c->n_grain;
+    for (int i = 0; i < c->n_grain; i++) {
+        const coupling_grain *g = &c->grain[i];
+        silt_exchange_grain *to = &e->grain[i];
+        *to = (silt_exchange_grain){.x = {g->x[0], g->x[1]},
+                                    .v = {g->v[0], g->v[1]},
+                                    .solid = g->solid,
+                                    .mass = g->mass,
+                                    .diameter = g->diameter,
+                                    .number = g->number,
+                                    .contact = {g->contact[0], g->contact[1]}};
+        to->cell = silt_locate(&c->locator, mesh, nodes->x, to->x, to->weight);
+        c->wet = c->wet || to->cell >= 0;
+    }
+    if (!c->wet)
+        return SILT_OK;
+    SILT_TRY(silt_exchange_prepare(e, nodes, mesh, dt, err));
+    *drag = &e->drag;
+    return SILT_OK;
+}
+
+static void coupling_load(silt_coupling *c, const silt_nodes *nodes, const silt_mesh *mesh, double dt) {
+    (void)mesh; // the exchange holds on to the one of prepare
+    if (c->wet)
+        silt_exchange_load(&c->exchange, nodes->v, nodes->p, dt);
+    else
+        c->exchange.totals = (silt_exchange_totals){0};
+    for (int i = 0; i < c->n_grain; i++)
+        for (int k = 0; k < 2; k++)
+            c->grain[i].force[k] = c->wet && i < c->n_loaded ? c->exchange.grain[i].force[k] : 0.0;
+}
+
+static void coupling_exchanged(const silt_coupling *c, double grains[2], double water[2]) {
+    for (int k = 0; k < 2; k++) {
+        grains[k] = c->exchange.totals.pressure[k] + c->exchange.totals.drag[k];
+        water[k] = c->exchange.totals.water[k];
+    }
+}
+
+// ---------------------------------------------------------------- substeps
+
+// spheres that LIGGGHTS has not heard of, in rising id: grains and frozen ones merged
+static void coupling_add(silt_coupling *c) {
+    int n = 0, i = 0, k = 0;
+    SILT_RESERVE(c->add, c->add_capacity, c->n_grain + c->frozen.count);
+    while (i < c->n_grain || k < c->frozen.count) {
+        if (k == c->frozen.count || (i < c->n_grain && c->grain[i].id < c->frozen.sphere[k].id)) {
+            coupling_grain *g = &c->grain[i++];
+            if (g->sent)
+                continue;
+            silt_dem_sphere *s = &c->add[n++];
+            *s = (silt_dem_sphere){.id = g->id,
+                                   .kind = DEM_GRAIN,
+                                   .radius = g->radius,
+                                   .density = coupling_sphere_density(c, g->mass, g->radius) * coupling_burden(c, g)};
+            memcpy(s->x, g->x, sizeof s->x);
+            memcpy(s->v, g->v, sizeof s->v);
+            memcpy(s->omega, g->omega, sizeof s->omega);
+            g->sent = true;
+        } else {
+            silt_frozen_sphere *f = &c->frozen.sphere[k++];
+            if (f->sent)
+                continue;
+            double density = c->scene->bed.on ? c->scene->bed.density : 1000.0;
+            c->add[n++] = (silt_dem_sphere){
+                .id = f->id, .kind = DEM_FROZEN, .x = {f->x[0], f->x[1]}, .radius = f->radius, .density = density};
+            f->sent = true;
+        }
+    }
+    if (n > 0)
+        silt_dem_add(c->dem, n, c->add);
+}
+
+static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
+    if (c->refused.count > 0)
+        return silt_fail(err, c->refused.status, "%s", c->refused.text);
+
+    // forces in the order of the last state, of spheres as they are in the slab
+    coupling_compact(c);
+    SILT_RESERVE(c->force, c->force_capacity, 3 * c->n_last);
+    for (int i = 0, k = 0; k < c->n_last; k++) {
+        double *f = c->force + 3 * k;
+        f[0] = f[1] = f[2] = 0.0;
+        while (i < c->n_grain && c->grain[i].id < c->last[k])
+            i++;
+        for (int d = 0; d < 2 && i < c->n_grain && c->grain[i].id == c->last[k]; d++)
+            f[d] = c->grain[i].force[d] * c->width * coupling_burden(c, &c->grain[i]);
+    }
+    for (int i = 0; i < c->bodies->count; i++)
+        for (int k = 0; k < 3; k++) {
+            c->body_force[3 * i + k] = c->bodies->body[i].force[k] * c->width;
+            c->body_torque[3 * i + k] = c->bodies->body[i].torque[k] * c->width;
+            c->body[i].old_v[k] = c->bodies->body[i].v[k];
+        }
+    for (int i = 0; i < c->n_grain; i++)
+        for (int k = 0; k < 2; k++) {
+            c->grain[i].old_x[k] = c->grain[i].x[k];
+            c->grain[i].old_v[k] = c->grain[i].v[k];
+        }
+
+    if (c->n_drop > 0)
+        silt_dem_remove(c->dem, c->n_drop, c->drop);
+    c->n_drop = 0;
+    coupling_add(c);
+    c->elapsed = n * c->step;
+    return silt_dem_start(c->dem, n, c->force, c->body_force, c->body_torque, err);
+}
+
+// true when the way from a to b leads over an outlet from left to right, or a is within `near` of one
+static bool coupling_leaves(const silt_fluid_def *fluid, const double a[2], const double b[2], double near) {
+    for (int i = 0; i < fluid->n_outlet; i++) {
+        const double *from = fluid->outlet[i].from, *to = fluid->outlet[i].to;
+        double e[2] = {to[0] - from[0], to[1] - from[1]}, square = e[0] * e[0] + e[1] * e[1];
+        double d[2] = {a[0] - from[0], a[1] - from[1]};
+        double side_a = e[0] * d[1] - e[1] * d[0], side_b = e[0] * (b[1] - from[1]) - e[1] * (b[0] - from[0]);
+        double t = silt_clamp((e[0] * d[0] + e[1] * d[1]) / square, 0.0, 1.0);
+        if (near > 0.0 && hypot(d[0] - t * e[0], d[1] - t * e[1]) <= near)
+            return true;
+        if (side_a < 0.0 || side_b >= 0.0)
+            continue;
+        double s = side_a / (side_a - side_b);
+        double x[2] = {a[0] + s * (b[0] - a[0]) - from[0], a[1] + s * (b[1] - a[1]) - from[1]};
+        double along = (e[0] * x[0] + e[1] * x[1]) / square;
+        if (along >= 0.0 && along <= 1.0)
+            return true;
+    }
+    return false;
+}
+
+static void coupling_leave(silt_coupling *c, coupling_grain *g) {
+    c->left_mass += g->mass;
+    c->left_count++;
+    coupling_take(c, g);
+}
+
+// a grain's new state, and what contacts did to it
+static void coupling_receive(silt_coupling *c, coupling_grain *g, const silt_dem_state *state, int k) {
+    memcpy(g->x, state->x + 3 * k, sizeof g->x);
+    memcpy(g->v, state->v + 3 * k, sizeof g->v);
+    memcpy(g->omega, state->omega + 3 * k, sizeof g->omega);
+    g->contacts = state->contacts[k];
+    g->on_bed = state->on_bed[k];
+    if (!(c->elapsed > 0.0))
+        return;
+    double net[2];
+    for (int d = 0; d < 2; d++) {
+        net[d] = g->mass * (g->v[d] - g->old_v[d]) / c->elapsed;
+        g->contact[d] = net[d] - g->force[d] - g->mass * c->scene->gravity[d];
+    }
+    g->net = hypot(net[0], net[1]);
+}
+
+static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
+    SILT_TRY(silt_dem_wait(c->dem, err));
+    const silt_dem_state *state = silt_dem_state_now(c->dem);
+    const silt_fluid_def *fluid = &c->scene->fluid;
+    for (int i = 0, k = 0; i < c->n_grain; i++) {
+        coupling_grain *g = &c->grain[i];
+        while (k < state->n_grain && state->id[k] < g->id)
+            k++;
+        if (k < state->n_grain && state->id[k] == g->id) {
+            coupling_receive(c, g, state, k);
+            if (coupling_leaves(fluid, g->old_x, g->x, 0.0))
+                coupling_leave(c, g);
+            continue;
+        }
+
+        // LIGGGHTS no longer has it: over an outlet, or lost
+        double ahead[2] = {g->old_x[0] + 2.0 * c->elapsed * g->v[0], g->old_x[1] + 2.0 * c->elapsed * g->v[1]};
+        if (!coupling_leaves(fluid, g->old_x, ahead, 4.0 * g->radius))
+            return silt_fail(
+                err, SILT_FAILED,
+                "grain %lld vanished: last seen at (%g, %g) with the velocity (%g, %g) m/s and the radius %g m; it "
+                "crossed no outlet, so it went through a wall or out of the scene where nothing closes it",
+                (long long)g->id, g->old_x[0], g->old_x[1], g->v[0], g->v[1], g->radius);
+        g->sent = false;
+        coupling_leave(c, g);
+    }
+
+    SILT_RESERVE(c->last, c->last_capacity, state->n_grain);
+    c->n_last = state->n_grain;
+    if (state->n_grain > 0)
+        memcpy(c->last, state->id, (size_t)state->n_grain * sizeof *c->last);
+    for (int i = 0; i < state->n_body && i < c->bodies->count; i++) {
+        struct silt_body *b = &c->bodies->body[i];
+        memcpy(b->x, state->body_x + 3 * i, sizeof b->x);
+        memcpy(b->v, state->body_v + 3 * i, sizeof b->v);
+        memcpy(b->w, state->body_omega + 3 * i, sizeof b->w);
+        memcpy(b->q, state->body_q + 4 * i, sizeof b->q);
+        for (int k = 0; k < 3 && c->elapsed > 0.0; k++)
+            b->contact[k] =
+                b->mass * ((b->v[k] - c->body[i].old_v[k]) / c->elapsed - c->scene->gravity[k]) - b->force[k];
+    }
+    return SILT_OK;
+}
+
+// ---------------------------------------------------------------- open and close
+
+// all but the worker: scene, shapes, sizes
+static silt_status coupling_create(silt_coupling **coupling, const silt_coupling_def *def, silt_dem_def *dem,
+                                   double (**wall)[4], silt_error *err) {
+    silt_coupling *c = *coupling = silt_alloc(1, sizeof *c);
+    c->scene = def->scene;
+    c->walls = def->walls;
+    c->next_id = 1;
+    c->view = silt_alloc(1, sizeof *c->view);
+    SILT_TRY(coupling_shapes(c, err));
+    coupling_measure(c, def, dem, wall);
+    return SILT_OK;
+}
+
+static silt_status coupling_send_bodies(silt_coupling *c, silt_error *err) {
+    for (int i = 0; i < c->bodies->count; i++) {
+        const struct silt_body *b = &c->bodies->body[i];
+        const silt_clump *clump = &c->body[i].clump;
+        silt_dem_body body = {.n_sphere = clump->n_sphere,
+                              .sphere = clump->sphere,
+                              .mass = b->mass * c->width,
+                              .inertia = b->inertia * c->width,
+                              .angle = 2.0 * atan2(b->q[3], b->q[0]),
+                              .fixed = c->body[i].fixed};
+        memcpy(body.x, b->x, sizeof body.x);
+        memcpy(body.v, b->v, sizeof body.v);
+        memcpy(body.omega, b->w, sizeof body.omega);
+        SILT_TRY(silt_dem_add_body(c->dem, &body, err));
+    }
+    return SILT_OK;
+}
+
+static void coupling_listed(silt_coupling *c) {
+    for (int i = 0; i < c->scene->grains.n_grain; i++) {
+        const silt_grain_def *def = &c->scene->grains.grain[i];
+        coupling_grain *g = coupling_append(c, def->at, def->velocity, def->diameter / 2.0);
+        g->solid = M_PI / 6.0 * def->diameter * def->diameter * def->diameter / c->width;
+        g->mass = def->density * g->solid;
+        g->diameter = def->diameter;
+        g->number = 1.0 / c->width;
+    }
+}
+
+static silt_status coupling_open(silt_coupling **coupling, const silt_coupling_def *def, silt_error *err) {
+    silt_dem_def dem;
+    double(*wall)[4] = NULL;
+    silt_status status = coupling_create(coupling, def, &dem, &wall, err);
+    silt_coupling *c = *coupling;
+    if (status == SILT_OK)
+        status = silt_dem_open(&c->dem, &dem, err);
+    if (status == SILT_OK)
+        status = coupling_send_bodies(c, err);
+    if (status != SILT_OK)
+        goto done;
+
+    // the spheres of the start, told at once so that the first step has an order of forces
+    coupling_listed(c);
+    if (def->bed != NULL)
+        coupling_bed_changed(c, def->bed);
+    status = coupling_start(c, 0, err);
+    if (status == SILT_OK)
+        status = coupling_finish(c, err);
+done:
+    free(wall);
+    if (status != SILT_OK)
+        coupling_close(coupling);
+    return status;
+}
+
+static void coupling_close(silt_coupling **coupling) {
+    silt_coupling *c = *coupling;
+    if (c == NULL)
+        return;
+    silt_dem_close(&c->dem);
+    for (int i = 0; i < c->bodies->count; i++) {
+        silt_outline_clear(&c->body[i].shape);
+        silt_clump_clear(&c->body[i].clump);
+    }
+    free(c->bodies->body);
+    free(c->bodies);
+    coupling_view *w = c->view;
+    void *owned[] = {w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
+                     w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
+                     c->body,     c->body_force, c->body_torque, c->force, c->add};
+    for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
+        free(owned[i]);
+    silt_frozen_clear(&c->frozen);
+    silt_exchange_clear(&c->exchange);
+    silt_locator_clear(&c->locator);
+    free(c);
+    *coupling = NULL;
+}
+
+// ---------------------------------------------------------------- small answers
+
+static double coupling_step(const silt_coupling *c) {
+    return c->step;
+}
+
+static silt_body_state *coupling_bodies(const silt_coupling *c) {
+    return c->bodies;
+}
+
+static int coupling_process(const silt_coupling *c) {
+    return silt_dem_process(c->dem);
+}
+
+static int coupling_outline(const silt_coupling *c, int body, double h, double *point, int capacity) {
+    return silt_outline_nodes(&c->body[body].shape, h, point, capacity);
+}
+
+static void coupling_left(const silt_coupling *c, double *mass, int64_t *count) {
+    *mass = c->left_mass;
+    *count = c->left_count;
+}
+
+// ---------------------------------------------------------------- checkpoint
+
+static silt_status coupling_save(silt_coupling *c, silt_store *store, silt_error *err) {
+    // edits in the queue are done first: what is saved is what LIGGGHTS has
+    SILT_TRY(coupling_start(c, 0, err));
+    SILT_TRY(coupling_finish(c, err));
+    SILT_TRY(silt_checkpoint_save(c, store, err));
+    return silt_dem_save(c->dem, store, err);
+}
+
+static silt_status coupling_load_state(silt_coupling **coupling, const silt_coupling_def *def, silt_store *store,
+                                       silt_error *err) {
+    silt_dem_def dem;
+    double(*wall)[4] = NULL;
+    silt_status status = coupling_create(coupling, def, &dem, &wall, err);
+    if (status == SILT_OK)
+        status = silt_checkpoint_load(*coupling, store, err);
+    if (status == SILT_OK)
+        status = silt_dem_load(&(*coupling)->dem, &dem, store, err);
+    free(wall);
+    if (status != SILT_OK)
+        coupling_close(coupling);
+    return status;
+}
+
+const silt_coupling_type silt_coupling_dem = {
+    .open = coupling_open,
+    .step = coupling_step,
+    .parcel_radius = coupling_parcel_radius,
+    .grains = coupling_grains,
+    .bodies = coupling_bodies,
+    .prepare = coupling_prepare,
+    .load = coupling_load,
+    .exchanged = coupling_exchanged,
+    .outline = coupling_outline,
+    .room = coupling_room,
+    .release = coupling_release,
+    .deposit = coupling_deposit,
+    .bed_changed = coupling_bed_changed,
+    .start = coupling_start,
+    .finish = coupling_finish,
+    .left = coupling_left,
+    .save = coupling_save,
+    .load_state = coupling_load_state,
+    .process = coupling_process,
+    .close = coupling_close,
+};

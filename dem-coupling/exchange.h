@@ -1,0 +1,83 @@
+/** @file exchange.h
+ * Grains in water, both ways: solid fraction, drag, pressure-gradient force and the grains' share of continuity. One
+ * kernel spreads and samples, so that what the grains gain the water loses. 2-D, everything per metre of width.
+ *
+ * Model A: F = -V grad p + beta (u - v), with u and grad p sampled through the kernel. The drag is implicit on both
+ * sides: beta_eff = beta / (1 + dt beta/m),  v_free = v + dt (g + (F_pressure + F_contact)/m), F_drag = beta_eff (u -
+ * v_free) = beta (u - v_end),  v_end = v_free + dt/m F_drag with F_contact what contacts did to the grain in the last
+ * step.
+ */
+#ifndef SILT_EXCHANGE_H
+#define SILT_EXCHANGE_H
+
+#include "kernel.h"
+
+typedef struct silt_exchange_grain {
+    // given before prepare
+    double x[2], v[2];
+    double solid;      // m3/m, solid volume
+    double mass;       // kg/m
+    double diameter;   // m, of the grains that the drag law sees
+    double number;     // 1/m, how many of these the parcel is, per metre of width
+    double contact[2]; // N/m, of contacts in the last step
+    int cell;          // of the water's mesh, -1: not in the water
+    double weight[3];  // barycentric, in that cell
+    // results
+    double water[2];    // m/s, the water's velocity at the grain
+    double drag_factor; // kg/(s m), beta
+    double effective;   // kg/(s m), beta_eff
+    double free[2];     // m/s, v_free of the last update
+    double pressure[2]; // N/m, force of the pressure gradient
+    double force[2];    // N/m, all of the water's force
+} silt_exchange_grain;
+
+/** what passed between grains and water in a step, N per m of width */
+typedef struct silt_exchange_totals {
+    double pressure[2]; // of the pressure gradient on grains
+    double drag[2];     // of drag on grains
+    double water[2];    // of drag on the water: sum over nodes of push - coefficient u; minus drag to rounding
+} silt_exchange_totals;
+
+typedef struct silt_exchange {
+    // given once
+    silt_drag_law law;
+    double density, viscosity; // of the water
+    double gravity[2];
+    double width; // m, of the kernel
+    bool refresh; // update also renews the coefficients; the fluid must then read them anew
+    // given before prepare
+    int n_grain, grain_capacity;
+    silt_exchange_grain *grain; // owned
+    // results
+    silt_drag drag;              // its arrays are owned by this struct
+    silt_exchange_totals totals; // of the last load
+    // inside
+    silt_kernel kernel;
+    const silt_mesh *mesh; // borrowed from prepare to load, so are the positions at the start of the step
+    const double *x;
+    double dt;
+    int n_node;
+    double *solid, *coefficient, *push, *source, *field; // owned, per node
+    double *area;                                        // owned, per cell, at the middle of the step
+    double (*gradient)[3][2];                            // owned, per cell
+    int node_capacity[5], cell_capacity[2];
+} silt_exchange;
+
+/** F/(u - v) in kg/s of one grain of diameter d in water of solid fraction `solid`, at the relative speed w. Above a
+ * solid fraction of 0.75 the formulas see 0.75. */
+double silt_drag_factor(silt_drag_law law, double density, double viscosity, double d, double solid, double w);
+
+/** Spreads the grains and makes the drag of a step dt from the nodes' velocity and pressure at its start, the grains'
+ * place in the mesh (cell, weight) given. Solid fraction and kernel stay as they are here until the next prepare;
+ * nodes' positions must not change before load. The drag's update takes the velocity that the mesh moves with: pressure
+ * gradient and source are those of the cells at x + dt/2 velocity, so that the force on the grains is, to rounding,
+ * what the water's pressure term  sum over cells of area grad p (mean of solid)  loses there.
+ * Errors (SILT_FAILED): the kernel cannot be built. */
+silt_status silt_exchange_prepare(silt_exchange *exchange, const silt_nodes *nodes, const silt_mesh *mesh, double dt,
+                                  silt_error *err);
+/** Final forces on the grains and the totals, from the accepted velocity (that the mesh moves with, as in update) and
+ * pressure. Coefficients, free velocities and cells are those of the last update: what the water felt. */
+void silt_exchange_load(silt_exchange *exchange, const double *velocity, const double *pressure, double dt);
+void silt_exchange_clear(silt_exchange *exchange);
+
+#endif

@@ -1,0 +1,91 @@
+/** @file protocol.h
+ * What the client (dem.c) and the worker (silt-dem) share: the layout of the shared memory and the instructions. Both
+ * map the same memory file; a byte over a socket pair hands it to and fro, so only one side touches it at a time, and
+ * each side sees at once when the other has ended. The client lays out the sections anew for every instruction.
+ */
+#ifndef SILT_PROTOCOL_H
+#define SILT_PROTOCOL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+// file descriptors that the worker inherits
+enum { DEM_FD_SOCKET = 3, DEM_FD_MEMORY, DEM_FD_RESTART, DEM_FD_FREE };
+
+// atom types: the wall's material first, the dead ones (about to be deleted) last
+enum { DEM_TYPE_WALL = 1, DEM_TYPE_GRAIN, DEM_TYPE_FROZEN, DEM_TYPE_BODY, DEM_TYPE_FIXED_BODY, DEM_TYPE_DEAD };
+
+// instructions
+enum {
+    DEM_OPEN = 'o',   // starts LIGGGHTS from the numbers below; with resume from the restart file
+    DEM_BODIES = 'b', // inserts the free bodies; before any sphere is there
+    DEM_RUN = 'r',    // remove, add, load, n_step substeps
+    DEM_SAVE = 's',   // LIGGGHTS' restart into the restart file
+    DEM_CLOSE = 'c',
+    DEM_DONE = 'd', // the worker's answer
+};
+
+/** a sphere to add */
+typedef struct dem_add {
+    int tag, type;
+    double x[3], v[3], omega[3], radius, density;
+} dem_add;
+
+/** a grain after a run */
+typedef struct dem_grain {
+    int tag, contacts, on_bed, pad;
+    double x[3], v[3], omega[3], radius, mass;
+} dem_grain;
+
+/** a free body: what it is (open, bodies), its load (run), its state (answer) */
+typedef struct dem_body {
+    int n_sphere, first; // its spheres in the sphere section, rows first .. first + n_sphere - 1; tag of row k is k + 1
+    double mass, inertia, angle;
+    double x[3], v[3], omega[3];
+    double axis[3]; // direction of a line fixed in the body
+    double force[3], torque[3];
+    int present, pad; // 0: it left the box
+} dem_body;
+
+typedef struct dem_shared {
+    uint64_t size; // bytes of the memory file; the worker maps again when it grew
+    // the numbers of silt_dem_def
+    double lo[2], hi[2], period, gravity[2];
+    double youngs_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
+    double step, max_radius, min_radius;
+    int resume;
+    // lengths of the sections
+    int n_wall, n_body, n_body_sphere, n_remove, n_add, n_force, max_grain;
+    int n_step;
+    // answer
+    int n_grain;
+    char text[1024]; // why the worker gave up, or empty
+    // sections, bytes from the start
+    uint64_t wall;        // 4 double per wall
+    uint64_t body;        // dem_body
+    uint64_t body_sphere; // 3 double: x, y from the centroid, radius
+    uint64_t remove;      // int: tags
+    uint64_t add;         // dem_add
+    uint64_t force;       // 3 double per grain of the last answer, in its order
+    uint64_t grain;       // dem_grain, rising tags (answer)
+} dem_shared;
+
+/** section of the shared memory as a pointer */
+#define DEM_SECTION(shared, type, name) ((type *)(void *)((char *)(shared) + (shared)->name))
+
+/** Lays the sections out one behind the other for the lengths above. @return bytes needed */
+static inline uint64_t dem_shared_layout(dem_shared *s) {
+    uint64_t end = (sizeof *s + 63) & ~(uint64_t)63;
+#define DEM_PLACE(name, count, type) (s->name = end, end += ((uint64_t)(count) * sizeof(type) + 63) & ~(uint64_t)63)
+    DEM_PLACE(wall, 4 * s->n_wall, double);
+    DEM_PLACE(body, s->n_body, dem_body);
+    DEM_PLACE(body_sphere, 3 * s->n_body_sphere, double);
+    DEM_PLACE(remove, s->n_remove, int);
+    DEM_PLACE(add, s->n_add, dem_add);
+    DEM_PLACE(force, 3 * s->n_force, double);
+    DEM_PLACE(grain, s->max_grain, dem_grain);
+#undef DEM_PLACE
+    return end;
+}
+
+#endif

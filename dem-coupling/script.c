@@ -1,0 +1,363 @@
+#include "script.h"
+
+#include <liggghts/library.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define COMMAND_LENGTH 2048
+
+// the k-th prime above 10000: LIGGGHTS wants a different one for every fix that draws random numbers
+static int script_prime(int k) {
+    int prime = 10007;
+    for (int n = 10009, found = 0; found < k; n += 2) {
+        bool composite = false;
+        for (int d = 3; d * d <= n && !composite; d += 2)
+            composite = n % d == 0;
+        if (!composite) {
+            prime = n;
+            found++;
+        }
+    }
+    return prime;
+}
+
+__attribute__((format(printf, 2, 3))) static void script_say(void *lmp, const char *format, ...) {
+    char line[COMMAND_LENGTH];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(line, sizeof line, format, list);
+    va_end(list);
+    lammps_command(lmp, line);
+}
+
+// a scratch file opened for writing from its start; closing it leaves the descriptor open
+static FILE *script_file(int fd) {
+    FILE *file = NULL;
+    int copy = dup(fd);
+    if (copy >= 0 && ftruncate(fd, 0) == 0 && lseek(fd, 0, SEEK_SET) == 0)
+        file = fdopen(copy, "w");
+    if (!file) {
+        perror("silt-dem: scratch file");
+        abort();
+    }
+    return file;
+}
+
+static void script_file_close(FILE *file) {
+    if (fclose(file) != 0) {
+        perror("silt-dem: scratch file");
+        abort();
+    }
+}
+
+// the contact law that spheres and walls share
+static const char *script_law(const dem_shared *s) {
+    return s->rolling_friction > 0 ? "model hertz tangential history rolling_friction epsd2"
+                                   : "model hertz tangential history";
+}
+
+static void script_materials(void *lmp, const dem_shared *s) {
+    const int n = DEM_TYPE_DEAD;
+    char value[COMMAND_LENGTH], friction[COMMAND_LENGTH];
+
+    if (s->youngs_modulus < 5e6)
+        script_say(lmp, "soft_particles yes");
+    if (s->youngs_modulus > 1e9)
+        script_say(lmp, "hard_particles yes");
+    // one value per type
+    int used = 0;
+    for (int i = 0; i < n; i++)
+        used += snprintf(value + used, sizeof value - (size_t)used, " %.17g", s->youngs_modulus);
+    script_say(lmp, "fix m1 all property/global youngsModulus peratomtype%s", value);
+    used = 0;
+    for (int i = 0; i < n; i++)
+        used += snprintf(value + used, sizeof value - (size_t)used, " %.17g", s->poissons_ratio);
+    script_say(lmp, "fix m2 all property/global poissonsRatio peratomtype%s", value);
+    // one value per pair of types
+    used = 0;
+    for (int i = 0; i < n * n; i++)
+        used += snprintf(value + used, sizeof value - (size_t)used, " %.17g", s->restitution);
+    script_say(lmp, "fix m3 all property/global coefficientRestitution peratomtypepair %d%s", n, value);
+    used = 0;
+    for (int i = 1; i <= n; i++)
+        for (int j = 1; j <= n; j++) {
+            bool body =
+                i == DEM_TYPE_BODY || j == DEM_TYPE_BODY || i == DEM_TYPE_FIXED_BODY || j == DEM_TYPE_FIXED_BODY;
+            used += snprintf(friction + used, sizeof friction - (size_t)used, " %.17g",
+                             body ? s->body_friction : s->friction);
+        }
+    script_say(lmp, "fix m4 all property/global coefficientFriction peratomtypepair %d%s", n, friction);
+    if (s->rolling_friction > 0) {
+        used = 0;
+        for (int i = 0; i < n * n; i++)
+            used += snprintf(value + used, sizeof value - (size_t)used, " %.17g", s->rolling_friction);
+        script_say(lmp, "fix m5 all property/global coefficientRollingFriction peratomtypepair %d%s", n, value);
+    }
+    script_say(lmp, "pair_style gran %s", script_law(s));
+    script_say(lmp, "pair_coeff * *");
+}
+
+// true when another wall ends at x and goes to the side of wall i on which the others lie
+static bool script_joined(const dem_shared *s, int i, const double x[2], double tolerance) {
+    const double(*wall)[4] = (const double(*)[4])DEM_SECTION(s, const double, wall);
+    for (int j = 0; j < s->n_wall; j++)
+        for (int end = 0; j != i && end < 4; end += 2)
+            if (fabs(wall[j][end] - x[0]) < tolerance && fabs(wall[j][end + 1] - x[1]) < tolerance)
+                return true;
+    return false;
+}
+
+// 0 or 1: wall i may be the infinite plane x = c or y = c: it runs along an axis, all other walls lie on one side, and
+// each end either meets another wall or comes near to the box' side, so that nothing is there to tell the difference;
+// else -1
+static int script_plane(const dem_shared *s, int i) {
+    const double(*wall)[4] = (const double(*)[4])DEM_SECTION(s, const double, wall);
+    const double near_side = 0.2; // of the box
+    const double *w = wall[i];
+    double tolerance = 1e-9 * (s->hi[0] - s->lo[0] + s->hi[1] - s->lo[1]);
+    int across = fabs(w[0] - w[2]) < tolerance ? 0 : fabs(w[1] - w[3]) < tolerance ? 1 : -1;
+    if (across < 0)
+        return -1;
+    int along = 1 - across;
+    bool below = false, above = false;
+    for (int j = 0; j < s->n_wall; j++)
+        for (int end = 0; end < 4; end += 2) {
+            below |= wall[j][end + across] < w[across] - tolerance;
+            above |= wall[j][end + across] > w[across] + tolerance;
+        }
+    if (below && above)
+        return -1;
+    double from = fmin(w[along], w[along + 2]), to = fmax(w[along], w[along + 2]),
+           margin = near_side * (s->hi[along] - s->lo[along]);
+    const double *first = w[along] <= w[along + 2] ? w : w + 2, *last = first == w ? w + 2 : w;
+    if (from > s->lo[along] + margin && !script_joined(s, i, first, tolerance))
+        return -1;
+    if (to < s->hi[along] - margin && !script_joined(s, i, last, tolerance))
+        return -1;
+    return across;
+}
+
+// cuts the segment to the box (Liang and Barsky); false: nothing is left
+static bool script_clip(const dem_shared *s, double w[4]) {
+    double t0 = 0, t1 = 1, d[2] = {w[2] - w[0], w[3] - w[1]};
+    for (int k = 0; k < 2; k++) {
+        double inset = 1e-6 * (s->hi[k] - s->lo[k]), lo = s->lo[k] + inset, hi = s->hi[k] - inset;
+        if (d[k] == 0) {
+            if (w[k] < lo || w[k] > hi)
+                return false;
+            continue;
+        }
+        double a = (lo - w[k]) / d[k], b = (hi - w[k]) / d[k];
+        t0 = fmax(t0, fmin(a, b));
+        t1 = fmin(t1, fmax(a, b));
+    }
+    if (t1 - t0 < 1e-9)
+        return false;
+    double x = w[0], y = w[1];
+    w[0] = x + t0 * d[0];
+    w[1] = y + t0 * d[1];
+    w[2] = x + t1 * d[0];
+    w[3] = y + t1 * d[1];
+    return true;
+}
+
+// the segment as a strip of triangles about z = 0, narrower than the period: no contact comes near its rims
+static void script_strip(FILE *file, const dem_shared *s, const double w[4]) {
+    double length = hypot(w[2] - w[0], w[3] - w[1]), z = 0.35 * s->period;
+    int n = (int)ceil(length / (0.7 * s->period));
+    double normal[2] = {-(w[3] - w[1]) / length, (w[2] - w[0]) / length};
+    for (int i = 0; i < n; i++) {
+        double a = (double)i / n, b = (double)(i + 1) / n;
+        double p[2][2] = {{w[0] + a * (w[2] - w[0]), w[1] + a * (w[3] - w[1])},
+                          {w[0] + b * (w[2] - w[0]), w[1] + b * (w[3] - w[1])}};
+        // corners of the two triangles: end along the wall, side in z
+        static const int corner[2][3][2] = {{{0, 0}, {0, 1}, {1, 1}}, {{0, 0}, {1, 1}, {1, 0}}};
+        for (int t = 0; t < 2; t++) {
+            fprintf(file, "facet normal %.9g %.9g 0\nouter loop\n", normal[0], normal[1]);
+            for (int c = 0; c < 3; c++)
+                fprintf(file, "vertex %.17g %.17g %.17g\n", p[corner[t][c][0]][0], p[corner[t][c][0]][1],
+                        corner[t][c][1] ? z : -z);
+            fprintf(file, "endloop\nendfacet\n");
+        }
+    }
+}
+
+static void script_walls(void *lmp, const dem_shared *s, int *plane) {
+    const double(*wall)[4] = (const double(*)[4])DEM_SECTION(s, const double, wall);
+    char path[128];
+    FILE *file = NULL;
+
+    snprintf(path, sizeof path, "%s/silt-dem-%d.stl", access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp",
+             (int)getpid());
+    int n_plane = 0;
+    for (int i = 0; i < s->n_wall; i++) {
+        int across = script_plane(s, i);
+        plane[i] = across >= 0;
+        if (across >= 0) {
+            script_say(lmp, "fix wp%d all wall/gran %s primitive type %d %cplane %.17g", i, script_law(s),
+                       DEM_TYPE_WALL, across ? 'y' : 'x', wall[i][across]);
+            n_plane++;
+            continue;
+        }
+        double w[4];
+        memcpy(w, wall[i], sizeof w);
+        if (!script_clip(s, w)) {
+            plane[i] = -1;
+            continue;
+        }
+        if (!file && !(file = fopen(path, "w"))) {
+            perror(path);
+            abort();
+        }
+        if (ftell(file) == 0)
+            fprintf(file, "solid walls\n");
+        script_strip(file, s, w);
+    }
+    if (file) {
+        fprintf(file, "endsolid walls\n");
+        script_file_close(file);
+        script_say(lmp, "fix wm all mesh/surface file %s type %d", path, DEM_TYPE_WALL);
+        unlink(path);
+        script_say(lmp, "fix ww all wall/gran %s mesh n_meshes 1 meshes wm", script_law(s));
+    }
+    // LIGGGHTS insists that type 1 is in use: a plane far away
+    if (!file && !n_plane)
+        script_say(lmp, "fix wp all wall/gran %s primitive type %d yplane %.17g", script_law(s), DEM_TYPE_WALL,
+                   s->lo[1] - 10 * (s->hi[1] - s->lo[1]) - 10 * s->max_radius);
+}
+
+void script_open(void *lmp, const dem_shared *s, const char *restart, int *plane) {
+    // bins of half the reach of the largest spheres; in a large empty box wider ones, since each costs time in every
+    // run (not `multi`: it finds no pairs at all in this LIGGGHTS)
+    const double max_bins = 5e5;
+    double skin = 0.3 * s->min_radius, size[2] = {s->hi[0] - s->lo[0], s->hi[1] - s->lo[1]};
+    double bin = fmax(s->max_radius + skin / 2, cbrt(size[0] * size[1] * s->period / max_bins));
+    if (bin > s->period)
+        bin = fmax(s->period, sqrt(size[0] * size[1] / max_bins));
+
+    script_say(lmp, "units si");
+    script_say(lmp, "atom_style sphere");
+    script_say(lmp, "atom_modify map array sort 0 0");
+    script_say(lmp, "boundary f f p");
+    script_say(lmp, "newton off");
+    script_say(lmp, "communicate single vel yes");
+    script_say(lmp, "processors 1 1 1");
+    if (s->resume) {
+        script_say(lmp, "read_restart %s", restart);
+    } else {
+        script_say(lmp, "region box block %.17g %.17g %.17g %.17g %.17g %.17g units box", s->lo[0], s->hi[0], s->lo[1],
+                   s->hi[1], -s->period / 2, s->period / 2);
+        script_say(lmp, "create_box %d box", DEM_TYPE_DEAD);
+    }
+    script_say(lmp, "neighbor %.17g bin", skin);
+    script_say(lmp, "neigh_modify delay 0 every 1 check yes binsize %.17g", bin);
+    script_say(lmp, "neigh_modify exclude type %d %d", DEM_TYPE_FROZEN, DEM_TYPE_FROZEN);
+    script_say(lmp, "neigh_modify exclude type %d %d", DEM_TYPE_FROZEN, DEM_TYPE_FIXED_BODY);
+    script_say(lmp, "neigh_modify exclude type %d %d", DEM_TYPE_FIXED_BODY, DEM_TYPE_FIXED_BODY);
+    script_materials(lmp, s);
+    script_say(lmp, "timestep %.17g", s->step);
+    double g = hypot(s->gravity[0], s->gravity[1]);
+    if (g > 0)
+        script_say(lmp, "fix grav all gravity %.17g vector %.17g %.17g 0", g, s->gravity[0] / g, s->gravity[1] / g);
+    script_walls(lmp, s, plane);
+    // the force on a sphere or, through one of its spheres, on a body; has to stand before the bodies
+    script_say(lmp, "fix cfd all couple/cfd couple_every 0 mpi");
+    script_say(lmp, "fix cff all couple/cfd/force");
+    script_say(lmp, "thermo_style custom step atoms");
+    script_say(lmp, "thermo 1000000000");
+    script_say(lmp, "thermo_modify lost ignore norm no");
+}
+
+static void script_groups(void *lmp) {
+    script_say(lmp, "group grains type %d", DEM_TYPE_GRAIN);
+    script_say(lmp, "group frozen type %d %d", DEM_TYPE_FROZEN, DEM_TYPE_FIXED_BODY);
+}
+
+void script_integrate(void *lmp, const dem_shared *s, const char *path, int fd) {
+    const dem_body *body = DEM_SECTION(s, const dem_body, body);
+    const double *sphere = DEM_SECTION(s, const double, body_sphere);
+
+    for (int k = 0; k < s->n_body; k++) {
+        const dem_body *b = &body[k];
+        FILE *file = script_file(fd);
+        double volume = 0;
+        for (int i = b->first; i < b->first + b->n_sphere; i++) {
+            const double *p = &sphere[3 * i];
+            fprintf(file, "%.17g %.17g 0 %.17g\n", p[0], p[1], p[2]);
+            volume += 4.0 / 3.0 * M_PI * p[2] * p[2] * p[2];
+        }
+        script_file_close(file);
+        // mass and inertia as given, no motion out of the plane; use_density keeps the given origin as the centroid
+        script_say(
+            lmp,
+            "fix pt%d all particletemplate/multisphere %d atom_type %d density constant %.17g nspheres %d ntry 100000 "
+            "spheres file %s scale 1.0 type %d mass %.17g inertia_tensor %.17g 0 0 %.17g 0 %.17g use_density "
+            "fflag on on off tflag off off on",
+            k, script_prime(3 * k), DEM_TYPE_BODY, b->mass / volume, b->n_sphere, path, k + 1, b->mass, b->inertia,
+            b->inertia, b->inertia);
+        script_say(lmp, "fix pd%d all particledistribution/discrete %d 1 pt%d 1.0", k, script_prime(3 * k + 1), k);
+    }
+    if (s->n_body)
+        script_say(lmp, "fix ms all multisphere allow_group_and_set yes");
+    script_groups(lmp);
+    // frozen spheres count as infinitely heavy in contacts: without it they would damp as if they moved
+    script_say(lmp, "fix freeze frozen freeze");
+    script_say(lmp, "fix nve grains nve/sphere");
+}
+
+void script_insert(void *lmp, const dem_shared *s, int k) {
+    const dem_body *b = &DEM_SECTION(s, const dem_body, body)[k];
+    script_say(lmp, "region rg sphere %.17g %.17g 0 1e-15 volume_limit 1e-60 units box", b->x[0], b->x[1]);
+    script_say(
+        lmp,
+        "fix in all insert/pack seed %d distributiontemplate pd%d maxattempt 5 verbose no insert_every once "
+        "overlapcheck no "
+        "all_in no vel constant %.17g %.17g 0 omega constant 0 0 %.17g orientation constant %.17g 0 0 %.17g region rg "
+        "ntry_mc 1001 particles_in_region 1",
+        script_prime(3 * k + 2), k, b->v[0], b->v[1], b->omega[2], cos(b->angle / 2), sin(b->angle / 2));
+    // a step so short that nothing moves
+    script_say(lmp, "timestep 1e-30");
+    script_say(lmp, "run 1 pre yes post no");
+    script_say(lmp, "timestep %.17g", s->step);
+    script_say(lmp, "unfix in");
+    script_say(lmp, "region rg delete");
+}
+
+void script_delete(void *lmp) {
+    script_say(lmp, "group dead type %d", DEM_TYPE_DEAD);
+    script_say(lmp, "delete_atoms group dead compress no");
+}
+
+void script_add(void *lmp, const dem_shared *s, const char *path, int fd) {
+    const dem_add *add = DEM_SECTION(s, const dem_add, add);
+    FILE *file = script_file(fd);
+    fprintf(file,
+            "spheres\n\n%d atoms\n%d atom types\n%.17g %.17g xlo xhi\n%.17g %.17g ylo yhi\n%.17g %.17g zlo "
+            "zhi\n\nAtoms\n\n",
+            s->n_add, DEM_TYPE_DEAD, s->lo[0], s->hi[0], s->lo[1], s->hi[1], -s->period / 2, s->period / 2);
+    for (const dem_add *a = add; a < add + s->n_add; a++)
+        fprintf(file, "%d %d %.17g %.17g %.17g %.17g 0\n", a->tag, a->type, 2 * a->radius, a->density, a->x[0],
+                a->x[1]);
+    fprintf(file, "\nVelocities\n\n");
+    for (const dem_add *a = add; a < add + s->n_add; a++)
+        fprintf(file, "%d %.17g %.17g 0 0 0 %.17g\n", a->tag, a->v[0], a->v[1], a->omega[2]);
+    script_file_close(file);
+    script_say(lmp, "read_data %s add", path);
+    script_groups(lmp);
+}
+
+void script_set_up(void *lmp) {
+    script_say(lmp, "run 0 pre yes post no");
+}
+
+void script_run(void *lmp, int n_step) {
+    script_say(lmp, "run %d pre no post no", n_step);
+}
+
+void script_save(void *lmp, const char *restart) {
+    script_say(lmp, "write_restart %s", restart);
+}

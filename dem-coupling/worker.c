@@ -1,0 +1,567 @@
+/* silt-dem: the program that links LIGGGHTS. Started by silt (dem.c) with a socket, the shared memory and a restart
+ * file open; it does one instruction after the other until it is told to end or its parent is gone. */
+#define _GNU_SOURCE
+#include "script.h"
+#include "touch.h"
+
+#include <errno.h>
+#include <liggghts/library.h>
+#include <math.h>
+#include <mpi.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define LIGGGHTS_SCREEN 16 // pointers into the LAMMPS object
+
+// C++ functions of LIGGGHTS' coupling library under their link names
+extern int lg_max_body(void *lmp) __asm__("_Z22liggghts_get_maxtag_msPv");
+extern void lg_push(const char *name, const char *type, void *lmp, void **data,
+                    const char *number) __asm__("_Z19data_liggghts_to_ofPKcS0_PvRS1_S0_");
+
+static struct {
+    dem_shared *shared;
+    uint64_t mapped; // bytes of shared
+    pid_t parent;
+    void *lmp;
+    int scratch; // descriptor of a memory file for what LIGGGHTS reads
+    int *plane;  // owned, one per wall, see script_open
+    int *row;    // owned, local index by tag, -1: not here
+    int n_row;
+    int *order; // owned, tags of the last answer
+    int n_order;
+    int n_body;         // free bodies
+    int *body_first;    // owned, first row of each body's spheres; the tag is one more
+    double *weight;     // owned, per row of the bodies' spheres: shares of a force that add up to one at the centroid
+    double *body_state; // owned, scratch, 3 per body
+    double **body_row;  // owned, rows of body_state
+    FILE *screen;       // closed by LIGGGHTS, NULL while it is the log
+} worker;
+
+// the end of the worker with a reason: the client reads it from the shared memory and finds the socket closed
+__attribute__((noreturn, format(printf, 1, 2))) static void worker_fail(const char *format, ...) {
+    char text[sizeof worker.shared->text];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    // one line
+    for (char *c = text; *c; c++)
+        if (*c == '\n')
+            *c = ' ';
+    if (worker.shared)
+        memcpy(worker.shared->text, text, sizeof text);
+    if (worker.screen) {
+        rewind(worker.screen);
+        for (int c = getc(worker.screen); c != EOF; c = getc(worker.screen))
+            putchar(c);
+    }
+    fflush(NULL);
+    fprintf(stderr, "%s\n", text);
+    _exit(70);
+}
+
+// ---- LIGGGHTS' own error functions, replaced: it would end MPI and exit without a word to the client
+#define WORKER_EXPORT __attribute__((visibility("default"), noreturn))
+WORKER_EXPORT void worker_error_all(void *, const char *, int, const char *) __asm__("_ZN9LAMMPS_NS5Error3allEPKciS2_");
+WORKER_EXPORT void worker_error_one(void *, const char *, int, const char *) __asm__("_ZN9LAMMPS_NS5Error3oneEPKciS2_");
+WORKER_EXPORT void worker_error_universe(void *, const char *, int,
+                                         const char *) __asm__("_ZN9LAMMPS_NS5Error12universe_allEPKciS2_");
+WORKER_EXPORT void worker_error_universe_one(void *, const char *, int,
+                                             const char *) __asm__("_ZN9LAMMPS_NS5Error12universe_oneEPKciS2_");
+WORKER_EXPORT void worker_error_fix(void *, const char *, int, void *,
+                                    const char *) __asm__("_ZN9LAMMPS_NS5Error9fix_errorEPKciPNS_3FixES2_");
+WORKER_EXPORT void worker_error_fix_style(void *, const char *, int, void *, const char *,
+                                          const char *) __asm__("_ZN9LAMMPS_NS5Error9fix_errorEPKciPNS_3FixES2_S2_");
+WORKER_EXPORT void
+worker_error_compute(void *, const char *, int, void *,
+                     const char *) __asm__("_ZN9LAMMPS_NS5Error13compute_errorEPKciPNS_7ComputeES2_");
+
+static const char *worker_base(const char *file) {
+    const char *slash = strrchr(file, '/');
+    return slash ? slash + 1 : file;
+}
+
+void worker_error_all(void *self, const char *file, int line, const char *text) {
+    (void)self;
+    worker_fail("LIGGGHTS: %s (%s:%d)", text, worker_base(file), line);
+}
+void worker_error_one(void *self, const char *file, int line, const char *text) {
+    worker_error_all(self, file, line, text);
+}
+void worker_error_universe(void *self, const char *file, int line, const char *text) {
+    worker_error_all(self, file, line, text);
+}
+void worker_error_universe_one(void *self, const char *file, int line, const char *text) {
+    worker_error_all(self, file, line, text);
+}
+void worker_error_fix(void *self, const char *file, int line, void *fix, const char *text) {
+    (void)fix;
+    worker_error_all(self, file, line, text);
+}
+void worker_error_fix_style(void *self, const char *file, int line, void *fix, const char *style, const char *text) {
+    (void)self;
+    (void)fix;
+    worker_fail("LIGGGHTS: fix %s: %s (%s:%d)", style, text, worker_base(file), line);
+}
+void worker_error_compute(void *self, const char *file, int line, void *compute, const char *text) {
+    (void)compute;
+    worker_error_all(self, file, line, text);
+}
+
+// warnings go to the log whatever the screen is; the first hundred of them
+#define WORKER_WARNING __attribute__((visibility("default")))
+WORKER_WARNING void worker_warning(void *, const char *, int, const char *,
+                                   int) __asm__("_ZN9LAMMPS_NS5Error7warningEPKciS2_i");
+WORKER_WARNING void worker_warning_all(void *, const char *, int, const char *,
+                                       int) __asm__("_ZN9LAMMPS_NS5Error10warningAllEPKciS2_i");
+
+void worker_warning(void *self, const char *file, int line, const char *text, int log) {
+    static int count;
+    (void)self;
+    (void)log;
+    if (count++ < 100)
+        fprintf(stderr, "WARNING: %s (%s:%d)\n", text, worker_base(file), line);
+}
+void worker_warning_all(void *self, const char *file, int line, const char *text, int log) {
+    worker_warning(self, file, line, text, log);
+}
+
+// ---- memory
+static void *worker_grow(void *data, size_t count, size_t size) {
+    void *grown = realloc(data, (count ? count : 1) * size);
+    if (!grown)
+        worker_fail("out of memory");
+    return grown;
+}
+
+// maps the shared memory, again when the client made it larger
+static void worker_map(void) {
+    struct stat file;
+    if (fstat(DEM_FD_MEMORY, &file) != 0)
+        worker_fail("shared memory: %s", strerror(errno));
+    if ((uint64_t)file.st_size == worker.mapped)
+        return;
+    dem_shared *old = worker.shared;
+    void *fresh = mmap(NULL, (size_t)file.st_size, PROT_READ | PROT_WRITE, MAP_SHARED, DEM_FD_MEMORY, 0);
+    if (fresh == MAP_FAILED)
+        worker_fail("shared memory: %s", strerror(errno));
+    worker.shared = fresh;
+    if (old)
+        munmap(old, worker.mapped);
+    worker.mapped = (uint64_t)file.st_size;
+}
+
+static const char *worker_path(int fd) {
+    static char path[2][64];
+    static int k;
+    k = !k;
+    snprintf(path[k], sizeof path[k], "/proc/self/fd/%d", fd);
+    return path[k];
+}
+
+// ---- LIGGGHTS' arrays
+typedef struct worker_atoms {
+    int n, *tag, *type;
+    double **x, **v, **omega, *radius, *mass;
+} worker_atoms;
+
+static worker_atoms worker_look(void) {
+    worker_atoms a = {.n = *(int *)lammps_extract_global(worker.lmp, "nlocal"),
+                      .tag = lammps_extract_atom(worker.lmp, "id"),
+                      .type = lammps_extract_atom(worker.lmp, "type"),
+                      .x = lammps_extract_atom(worker.lmp, "x"),
+                      .v = lammps_extract_atom(worker.lmp, "v"),
+                      .omega = lammps_extract_atom(worker.lmp, "omega"),
+                      .radius = lammps_extract_atom(worker.lmp, "radius"),
+                      .mass = lammps_extract_atom(worker.lmp, "rmass")};
+    return a;
+}
+
+// local index by tag
+static void worker_index(const worker_atoms *a) {
+    int most = 0;
+    for (int i = 0; i < a->n; i++)
+        most = a->tag[i] > most ? a->tag[i] : most;
+    worker.row = worker_grow(worker.row, (size_t)most + 1, sizeof *worker.row);
+    worker.n_row = most + 1;
+    for (int t = 0; t <= most; t++)
+        worker.row[t] = -1;
+    for (int i = 0; i < a->n; i++)
+        worker.row[a->tag[i]] = i;
+}
+
+static int worker_find(int tag) {
+    return tag > 0 && tag < worker.n_row ? worker.row[tag] : -1;
+}
+
+static double **worker_body_read(const char *name) {
+    memset(worker.body_state, 0, 3 * (size_t)worker.n_body * sizeof(double));
+    void *data = worker.body_row;
+    lg_push(name, "vector-multisphere", worker.lmp, &data, "double");
+    return worker.body_row;
+}
+
+// rounding must not carry spheres out of the plane; bodies have no freedom to leave it
+static void worker_flatten(const worker_atoms *a) {
+    for (int i = 0; i < a->n; i++)
+        a->x[i][2] = a->v[i][2] = a->omega[i][0] = a->omega[i][1] = 0;
+}
+
+static void worker_check(const worker_atoms *a, const char *when) {
+    for (int i = 0; i < a->n; i++)
+        if (!isfinite(a->x[i][0] + a->x[i][1] + a->v[i][0] + a->v[i][1] + a->omega[i][2]))
+            worker_fail("a sphere of type %d is not finite %s: x (%g, %g), v (%g, %g), omega %g", a->type[i], when,
+                        a->x[i][0], a->x[i][1], a->v[i][0], a->v[i][1], a->omega[i][2]);
+}
+
+// ---- the answer: state of grains and bodies
+static int worker_compare(const void *a, const void *b) {
+    int p = *(const int *)a, q = *(const int *)b;
+    return (p > q) - (p < q);
+}
+
+static void worker_answer_bodies(void) {
+    dem_body *body = DEM_SECTION(worker.shared, dem_body, body);
+    static const char *const name[] = {"xcm", "vcm", "angmom", "ex_space"};
+    for (int k = 0; worker.n_body && k < 4; k++) {
+        double **row = worker_body_read(name[k]);
+        for (int b = 0; b < worker.n_body; b++) {
+            double *to = k == 0 ? body[b].x : k == 1 ? body[b].v : k == 2 ? body[b].omega : body[b].axis;
+            memcpy(to, row[b], 3 * sizeof(double));
+        }
+    }
+    // angular momentum came; the inertia is the same about all axes
+    for (int b = 0; b < worker.n_body; b++) {
+        for (int c = 0; c < 3; c++)
+            body[b].omega[c] /= body[b].inertia;
+        body[b].present = worker_find(worker.body_first[b] + 1) >= 0;
+    }
+}
+
+static void worker_answer(void) {
+    worker_atoms a = worker_look();
+    dem_grain *grain = DEM_SECTION(worker.shared, dem_grain, grain);
+    int *contacts = worker_grow(NULL, (size_t)a.n, sizeof *contacts),
+        *on_bed = worker_grow(NULL, (size_t)a.n, sizeof *on_bed);
+
+    worker_check(&a, "after the run");
+    worker_index(&a);
+    if (touch_count(a.n, a.x, a.radius, a.type, worker.shared, worker.plane, contacts, on_bed) != 0)
+        worker_fail("out of memory");
+    // rising tags
+    worker.order = worker_grow(worker.order, (size_t)a.n, sizeof *worker.order);
+    worker.n_order = 0;
+    bool sorted = true;
+    for (int i = 0; i < a.n; i++)
+        if (a.type[i] == DEM_TYPE_GRAIN) {
+            sorted &= worker.n_order == 0 || worker.order[worker.n_order - 1] < a.tag[i];
+            worker.order[worker.n_order++] = a.tag[i];
+        }
+    if (!sorted)
+        qsort(worker.order, (size_t)worker.n_order, sizeof *worker.order, worker_compare);
+    if (worker.n_order > worker.shared->max_grain)
+        worker_fail("%d grains, expected at most %d", worker.n_order, worker.shared->max_grain);
+    worker.shared->n_grain = worker.n_order;
+    for (int k = 0; k < worker.n_order; k++) {
+        int i = worker.row[worker.order[k]];
+        dem_grain *g = &grain[k];
+        *g = (dem_grain){
+            .tag = a.tag[i], .contacts = contacts[i], .on_bed = on_bed[i], .radius = a.radius[i], .mass = a.mass[i]};
+        memcpy(g->x, a.x[i], sizeof g->x);
+        memcpy(g->v, a.v[i], sizeof g->v);
+        memcpy(g->omega, a.omega[i], sizeof g->omega);
+    }
+    worker_answer_bodies();
+    free(contacts);
+    free(on_bed);
+}
+
+// ---- instructions
+
+// shares w = a + b . d of a body's spheres at d from the centroid, with sum w = 1 and sum w d = 0: a force shared out
+// so acts at the centroid however the body turns during the run
+static void worker_share(const dem_body *body, const double *sphere, double *weight) {
+    double s[2] = {0, 0}, m[3] = {0, 0, 0};
+    int n = body->n_sphere;
+    for (int i = 0; i < n; i++) {
+        const double *d = &sphere[3 * i];
+        for (int c = 0; c < 2; c++)
+            s[c] += d[c];
+        m[0] += d[0] * d[0];
+        m[1] += d[0] * d[1];
+        m[2] += d[1] * d[1];
+    }
+    // spheres on a line have a singular matrix
+    double ridge = 1e-12 * (m[0] + m[2]) + 1e-300;
+    m[0] += ridge;
+    m[2] += ridge;
+    double det = m[0] * m[2] - m[1] * m[1];
+    double r[2] = {(m[2] * s[0] - m[1] * s[1]) / det, (m[0] * s[1] - m[1] * s[0]) / det};
+    double left = n - (s[0] * r[0] + s[1] * r[1]);
+    for (int i = 0; i < n; i++) {
+        const double *d = &sphere[3 * i];
+        // one sphere beside the centroid cannot do it: it takes all, and worker_load mends the torque
+        weight[i] = left > 1e-6 ? (1 - r[0] * d[0] - r[1] * d[1]) / left : i == 0;
+    }
+}
+
+static void worker_body_table(void) {
+    const dem_body *body = DEM_SECTION(worker.shared, const dem_body, body);
+    const double *sphere = DEM_SECTION(worker.shared, const double, body_sphere);
+    worker.n_body = worker.shared->n_body;
+    worker.body_first = worker_grow(worker.body_first, (size_t)worker.n_body, sizeof *worker.body_first);
+    worker.body_state = worker_grow(worker.body_state, 3 * (size_t)worker.n_body, sizeof *worker.body_state);
+    worker.body_row = worker_grow(worker.body_row, (size_t)worker.n_body, sizeof *worker.body_row);
+    worker.weight = worker_grow(worker.weight, (size_t)worker.shared->n_body_sphere, sizeof *worker.weight);
+    for (int b = 0; b < worker.n_body; b++) {
+        worker.body_first[b] = body[b].first;
+        worker.body_row[b] = &worker.body_state[3 * b];
+        worker_share(&body[b], &sphere[3 * body[b].first], &worker.weight[body[b].first]);
+    }
+}
+
+static void worker_open(void) {
+    dem_shared *s = worker.shared;
+
+    // its screen is our standard output, which is the log; a line at a time, so that the last one is there when it dies
+    char *argument[] = {"silt-dem", "-log", "none", "-nocite", NULL};
+    lammps_open(4, argument, MPI_COMM_WORLD, &worker.lmp);
+    if (!worker.lmp)
+        worker_fail("LIGGGHTS does not start");
+    worker.plane = worker_grow(worker.plane, (size_t)s->n_wall, sizeof *worker.plane);
+    script_open(worker.lmp, s, worker_path(DEM_FD_RESTART), worker.plane);
+    if (s->resume) {
+        worker_body_table();
+        script_integrate(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
+        script_set_up(worker.lmp);
+        worker_answer();
+    }
+    // from here on five lines a run would fill the disk: the screen, a known member of LIGGGHTS' object, becomes a
+    // memory file that is emptied before every instruction and shown when something fails
+    FILE **screen = &((FILE **)worker.lmp)[LIGGGHTS_SCREEN];
+    int memory = memfd_create("silt-dem-screen", MFD_CLOEXEC);
+    printf("ready\n");
+    fflush(stdout);
+    if (*screen == stdout && memory >= 0 && (worker.screen = fdopen(memory, "w+")))
+        *screen = worker.screen;
+}
+
+static void worker_bodies(void) {
+    dem_shared *s = worker.shared;
+    const dem_body *body = DEM_SECTION(s, const dem_body, body);
+
+    worker_body_table();
+    script_integrate(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
+    for (int b = 0; b < worker.n_body; b++) {
+        script_insert(worker.lmp, s, b);
+        int there = lg_max_body(worker.lmp), spheres = lammps_get_natoms(worker.lmp);
+        if (there != b + 1 || spheres != body[b].first + body[b].n_sphere)
+            worker_fail("body %d could not be placed at (%g, %g): LIGGGHTS has %d bodies and %d spheres", b,
+                        body[b].x[0], body[b].x[1], there, spheres);
+    }
+    worker_answer();
+}
+
+// forces of this run: on every grain its own, on every body through its spheres
+static void worker_load(void) {
+    dem_shared *s = worker.shared;
+    worker_atoms a = worker_look();
+    const double *force = DEM_SECTION(s, const double, force);
+    const dem_body *body = DEM_SECTION(s, const dem_body, body);
+    double **f = lammps_extract_fix(worker.lmp, "dragforce", 1, 2, 0, 0),
+           **t = lammps_extract_fix(worker.lmp, "hdtorque", 1, 2, 0, 0);
+
+    worker_index(&a);
+    worker_flatten(&a);
+    worker_check(&a, "before the run");
+    for (int i = 0; i < a.n; i++)
+        memset(f[i], 0, 3 * sizeof(double)), memset(t[i], 0, 3 * sizeof(double));
+    for (int k = 0; k < s->n_force && k < worker.n_order; k++) {
+        int i = worker_find(worker.order[k]);
+        if (i >= 0 && a.type[i] == DEM_TYPE_GRAIN)
+            memcpy(f[i], &force[3 * k], 2 * sizeof(double));
+    }
+    // bodies stand where the last answer said
+    for (int b = 0; b < worker.n_body; b++) {
+        const double *F = body[b].force;
+        double moment = 0;
+        for (int k = body[b].first; k < body[b].first + body[b].n_sphere; k++) {
+            int i = worker_find(k + 1);
+            if (i < 0)
+                break;
+            f[i][0] = worker.weight[k] * F[0];
+            f[i][1] = worker.weight[k] * F[1];
+            moment += (a.x[i][0] - body[b].x[0]) * f[i][1] - (a.x[i][1] - body[b].x[1]) * f[i][0];
+        }
+        int i = worker_find(worker.body_first[b] + 1);
+        if (i >= 0)
+            t[i][2] = body[b].torque[2] - moment;
+    }
+}
+
+// Sets LIGGGHTS up anew, then goes n_step. The set-up computes the forces of the first half kick, but does not advance
+// the tangential springs: a sliding contact then stands exactly at Coulomb's limit, counts as sticking, and is braked
+// by the full tangential dashpot, once a run. So the set-up sees everything at rest: springs and forces as they are, no
+// dashpots.
+static void worker_advance(int n_step) {
+    worker_atoms a = worker_look();
+    worker_index(&a);
+    int n_row = worker.n_row;
+    double *keep = worker_grow(NULL, 6 * (size_t)n_row, sizeof *keep);
+    for (int i = 0; i < a.n; i++) {
+        double *row = &keep[6 * a.tag[i]];
+        memcpy(row, a.v[i], 3 * sizeof *row);
+        memcpy(row + 3, a.omega[i], 3 * sizeof *row);
+        memset(a.v[i], 0, 3 * sizeof *row);
+        memset(a.omega[i], 0, 3 * sizeof *row);
+    }
+    script_set_up(worker.lmp);
+    // atoms outside the box are gone now, others have moved up
+    a = worker_look();
+    for (int i = 0; i < a.n; i++) {
+        const double *row = &keep[6 * a.tag[i]];
+        memcpy(a.v[i], row, 3 * sizeof *row);
+        memcpy(a.omega[i], row + 3, 3 * sizeof *row);
+    }
+    free(keep);
+    if (n_step > 0)
+        script_run(worker.lmp, n_step);
+}
+
+static void worker_run(void) {
+    dem_shared *s = worker.shared;
+    const int *gone = DEM_SECTION(s, const int, remove);
+
+    if (s->n_remove) {
+        worker_atoms a = worker_look();
+        worker_index(&a);
+        int n = 0;
+        for (int k = 0; k < s->n_remove; k++) {
+            int i = worker_find(gone[k]);
+            if (i >= 0)
+                a.type[i] = DEM_TYPE_DEAD, n++;
+        }
+        // once between two runs: twice would spoil the contacts' history
+        if (n)
+            script_delete(worker.lmp);
+    }
+    if (s->n_add)
+        script_add(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
+    if (s->n_step > 0) {
+        worker_load();
+        worker_advance(s->n_step);
+    } else if (s->n_remove || s->n_add) {
+        worker_advance(0);
+    }
+    worker_answer();
+}
+
+// a worker that starts from this file sets itself up once before it takes edits; so does this one, to stay its equal
+static void worker_save(void) {
+    script_save(worker.lmp, worker_path(DEM_FD_RESTART));
+    script_set_up(worker.lmp);
+}
+
+// ---- life
+// the parent's death; its thread's death alone is none
+static void worker_orphan(int number) {
+    (void)number;
+    if (getppid() != worker.parent)
+        _exit(71);
+}
+
+static void worker_signals(void) {
+    // the parent decides what a signal from the terminal or the queue means
+    static const int ignored[] = {SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGUSR2, SIGPIPE, SIGQUIT};
+    for (size_t k = 0; k < sizeof ignored / sizeof *ignored; k++)
+        signal(ignored[k], SIG_IGN);
+    struct sigaction action = {.sa_handler = worker_orphan, .sa_flags = SA_RESTART};
+    sigaction(SIGRTMIN, &action, NULL);
+    prctl(PR_SET_PDEATHSIG, SIGRTMIN);
+    worker_orphan(0);
+}
+
+static void worker_mpi(void) {
+    // a single rank by itself: no daemon, no network, even when silt itself was started by a launcher
+    static const char *const launcher[] = {"PMIX_", "PMI_", "OMPI_"};
+    for (size_t k = 0; k < sizeof launcher / sizeof *launcher; k++)
+        for (char **e = environ; *e;) {
+            char name[256];
+            size_t length = strcspn(*e, "=");
+            if (strncmp(*e, launcher[k], strlen(launcher[k])) == 0 && length < sizeof name) {
+                memcpy(name, *e, length);
+                name[length] = 0;
+                unsetenv(name);
+                e = environ;
+            } else {
+                e++;
+            }
+        }
+    setenv("OMPI_MCA_pml", "ob1", 1);
+    setenv("OMPI_MCA_btl", "self", 1);
+    setenv("OMPI_MCA_ess_singleton_isolated", "1", 1);
+    setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
+    setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
+    if (MPI_Init(NULL, NULL) != MPI_SUCCESS)
+        worker_fail("MPI does not start");
+    // a crash is reported by the client; no second trace in the log
+    static const int crash[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+    for (size_t k = 0; k < sizeof crash / sizeof *crash; k++)
+        signal(crash[k], SIG_DFL);
+}
+
+int main(int argc, char **argv) {
+    struct stat file;
+
+    if (argc != 3 || strcmp(argv[1], "serve") != 0 || fstat(DEM_FD_SOCKET, &file) != 0 || !S_ISSOCK(file.st_mode)) {
+        fprintf(stderr, "silt-dem is the worker that silt starts for grains and bodies; it cannot be used by hand\n");
+        return 2;
+    }
+    setvbuf(stdout, NULL, _IOLBF, 0);
+    worker.parent = (pid_t)atoi(argv[2]);
+    worker_signals();
+    worker_map();
+    worker.scratch = memfd_create("silt-dem-scratch", MFD_CLOEXEC);
+    if (worker.scratch < 0)
+        worker_fail("memory file: %s", strerror(errno));
+    worker_mpi();
+
+    for (;;) {
+        char word = 0;
+        ssize_t got = recv(DEM_FD_SOCKET, &word, 1, 0);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got != 1 || word == DEM_CLOSE)
+            break;
+        worker_map();
+        worker.shared->text[0] = 0;
+        if (worker.screen) {
+            rewind(worker.screen);
+            if (ftruncate(fileno(worker.screen), 0) != 0)
+                worker_fail("memory file: %s", strerror(errno));
+        }
+        if (word == DEM_OPEN)
+            worker_open();
+        else if (word == DEM_BODIES)
+            worker_bodies();
+        else if (word == DEM_RUN)
+            worker_run();
+        else if (word == DEM_SAVE)
+            worker_save();
+        word = DEM_DONE;
+        if (send(DEM_FD_SOCKET, &word, 1, MSG_NOSIGNAL) != 1)
+            break;
+    }
+    if (worker.lmp)
+        lammps_close(worker.lmp);
+    MPI_Finalize();
+    return 0;
+}

@@ -1,0 +1,96 @@
+/** @file base.c
+ * Status passing, memory, text, hashing, random numbers and the clock.
+ */
+#include "base.h"
+
+#include <time.h>
+
+silt_status silt_fail(silt_error *err, silt_status status, const char *format, ...) {
+    if (!err)
+        return status;
+    va_list list;
+    va_start(list, format);
+    // format into a copy: an argument may be the old text of err itself
+    char text[sizeof err->text];
+    vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    memcpy(err->text, text, strlen(text) + 1);
+    err->status = status;
+    err->count = 1;
+    return status;
+}
+
+// the only place where the library ends the program: there is no memory left to say anything better
+static void memory_exhausted(size_t n, size_t size) {
+    fprintf(stderr, "silt: out of memory: %zu items of %zu bytes were asked for\n", n, size);
+    abort();
+}
+
+void *silt_alloc(size_t n, size_t size) {
+    void *data = calloc(n ? n : 1, size ? size : 1);
+    if (!data)
+        memory_exhausted(n, size);
+    return data;
+}
+
+void *silt_grow(void *data, int *capacity, int need, size_t size) {
+    if (need <= *capacity)
+        return data;
+    // half more than before, so that pushing one by one costs a constant each
+    int64_t wanted = (int64_t)*capacity + *capacity / 2 + 8;
+    if (wanted < need)
+        wanted = need;
+    if (wanted > INT32_MAX)
+        wanted = INT32_MAX;
+    size_t bytes = 0;
+    void *grown = NULL;
+    if (!__builtin_mul_overflow((size_t)wanted, size, &bytes))
+        grown = realloc(data, bytes ? bytes : 1);
+    if (!grown)
+        memory_exhausted((size_t)wanted, size);
+    size_t old = (size_t)*capacity * size;
+    memset((char *)grown + old, 0, bytes - old);
+    *capacity = (int)wanted;
+    return grown;
+}
+
+char *silt_text(const char *format, ...) {
+    va_list list, again;
+    va_start(list, format);
+    va_copy(again, list);
+    int length = vsnprintf(NULL, 0, format, list);
+    va_end(list);
+    size_t size = length < 0 ? 1 : (size_t)length + 1;
+    char *text = silt_alloc(size, 1);
+    if (length >= 0)
+        vsnprintf(text, size, format, again);
+    va_end(again);
+    return text;
+}
+
+double silt_seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+uint64_t silt_hash(uint64_t seed, const void *data, size_t size) {
+    // FNV-1a, 64 bits
+    uint64_t hash = seed ? seed : 0xcbf29ce484222325u;
+    const unsigned char *byte = data;
+    for (size_t i = 0; i < size; i++)
+        hash = (hash ^ byte[i]) * 0x100000001b3u;
+    return hash;
+}
+
+uint64_t silt_random(uint64_t *state) {
+    // splitmix64
+    uint64_t z = *state += 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+
+double silt_uniform(uint64_t *state) {
+    return (double)(silt_random(state) >> 11) * 0x1p-53;
+}

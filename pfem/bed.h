@@ -1,0 +1,66 @@
+/** @file bed.h
+ * The bed: its own mesh of bed material; frictional work at its surface; release and deposition. Knows nothing of discrete elements.
+ */
+#ifndef SILT_BED_H
+#define SILT_BED_H
+
+#include "pfem.h"
+
+/** what a bed node takes along when it is released: all bed cells around it */
+typedef struct silt_patch {
+    int node;
+    double centre[2]; // centroid of the patch, m
+    double normal[2]; // unit, out of the bed at the node
+    double mass;      // kg/m, solid
+    double area;      // m2
+    double height;    // m, area over exposed length at the node (half of its exposed edges'); 0 while not exposed
+    int n_cell;
+    int cell[32];     // bed cells
+} silt_patch;
+
+typedef enum {
+    DEPOSIT_REFUSED = 0, // too far from the bed, or no sound place
+    DEPOSIT_CELL,        // the bed grew by cells with a new node
+    DEPOSIT_DENSER,      // the mass went into the pores of a cell that was there
+} silt_deposit_kind;
+typedef struct silt_deposit {
+    silt_deposit_kind kind;
+    int node;          // the new bed node, or -1
+    int n_cell;
+    int cell[8];       // the new cells
+    double area;       // m2, of the new cells
+    double pore_water; // kg/m, water taken out of the flow by the new pores (negative: displaced out of pores)
+} silt_deposit;
+
+/** Fills the bed's regions with nodes at spacing bed.size and triangles between them. fluid_density is for pore water. */
+silt_status silt_bed_create(silt_bed *bed, const silt_scene *scene, silt_error *err);
+void silt_bed_clear(silt_bed *bed);
+/** unit normal out of the bed at an exposed node, from its exposed edges */
+void silt_bed_normal(const silt_bed *bed, int node, double normal[2]);
+/** Adds a step's frictional work at the exposed nodes (law, threshold and distance of the scene), and refreshes bed->shear. */
+void silt_bed_wear(silt_bed *bed, const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh,
+                   const silt_locator *locator, double dt);
+/** Exposed nodes whose accumulator is full, fullest first: work >= W_c, with a layer eroded >= mass per exposed length of the
+ * patch. Ask once a step: what that step's releases expose comes in the next. @return how many (at most capacity) */
+int silt_bed_due(const silt_bed *bed, const silt_scene *scene, int capacity, int *due);
+void silt_bed_patch(const silt_bed *bed, int node, silt_patch *patch);
+/** Takes the patch out of the bed: its cells vanish, nodes without cells die (their fluid_node stays for the caller to read),
+ * newly exposed ones start with the excess over W_c, shared over their lengths of surface, at most one layer. The pore water
+ * of the patch is added to bed->pore_water. The patch must be that of the bed as it is: any change renumbers cells. */
+void silt_bed_release(silt_bed *bed, const silt_scene *scene, const silt_patch *patch);
+/** Nodes whose patches hold small pieces that hang in the water: under ten patches, no edge on a wall, joined to the rest of
+ * the bed by nodes at most. Releasing them all (each patch asked for anew) may need another call when the piece has cells
+ * inside. @return how many (at most capacity) */
+int silt_bed_loose(const silt_bed *bed, const silt_scene *scene, int capacity, int *node);
+/** Puts a parcel's solid mass (kg/m) at x (radius r) back on the bed. The new node is at x; up to r higher where that would
+ * leave the mass too little room; on a wall that is nearer than half a spacing and where the surface ends. deposit->cell
+ * holds until the next change. @return also in deposit->kind */
+silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const double x[2], double r, double mass,
+                                   silt_deposit *deposit);
+bool silt_bed_contains(const silt_bed *bed, const double x[2]);
+/** height of the bed's surface at abscissa x, or -HUGE_VAL where there is none */
+double silt_bed_level(const silt_bed *bed, double x);
+silt_status silt_bed_save(const silt_bed *bed, silt_store *store, silt_error *err);
+silt_status silt_bed_load(silt_bed *bed, silt_store *store, silt_error *err);
+
+#endif

@@ -1,0 +1,66 @@
+/** @file coupling.h
+ * The door between the time loop and the discrete elements. pfem/ knows this table only; dem-coupling/coupling.c fills it.
+ * Everything on this side is per metre of width in 2-D; the coupling scales to real spheres and back.
+ */
+#ifndef SILT_COUPLING_H
+#define SILT_COUPLING_H
+
+#include "bed.h"
+
+typedef struct silt_coupling silt_coupling; // opaque, owned by the run
+
+typedef struct silt_coupling_def {
+    const silt_scene *scene; // borrowed
+    const silt_walls *walls; // borrowed
+    const silt_bed *bed;     // borrowed, NULL without bed
+    const char *worker;      // path of silt-dem
+    const char *log;         // OUT/dem.log
+    double lo[2], hi[2];     // the domain's box (with margin): what leaves it has left
+} silt_coupling_def;
+
+typedef struct silt_coupling_type {
+    silt_status (*open)(silt_coupling **coupling, const silt_coupling_def *def, silt_error *err);
+    /** s, the discrete elements' time step; the fluid's step is an integer multiple of it */
+    double (*step)(const silt_coupling *coupling);
+    /** radius in m of a parcel with this solid mass per metre of width */
+    double (*parcel_radius)(const silt_coupling *coupling, double mass);
+    const silt_grain_state *(*grains)(const silt_coupling *coupling); // count 0 when there are none
+    silt_body_state *(*bodies)(const silt_coupling *coupling);        // count 0 when there are none
+
+    /** Before the water's step: finds the grains in the mesh, spreads their volume, prepares the drag for a step dt.
+     * *drag is NULL when no grain is in the water. May be called again with another dt. */
+    silt_status (*prepare)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, double dt,
+                           const silt_drag **drag, silt_error *err);
+    /** After the water's step, before nodes move: forces on grains from the accepted pressure and the velocity that the drag
+     * was solved with (nodes->v must be the fluid's w, that positions move with; their sum is then what the water felt),
+     * forces on bodies: force and torque in bodies()->body[] were set by the run. */
+    void (*load)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, double dt);
+
+    /** N per m of width, of the last load: the water's force on all grains (pressure gradient and drag), and the grains' drag
+     * on the water as the sum over nodes of push - coefficient velocity */
+    void (*exchanged)(const silt_coupling *coupling, double grains[2], double water[2]);
+    /** Points on a body's outline at spacing h, corners kept, in the body's frame; @return how many (none written beyond capacity) */
+    int (*outline)(const silt_coupling *coupling, int body, double h, double *point, int capacity);
+
+    /** true when a sphere fits there: overlap with grains, frozen spheres, bodies and walls at most 1 % of its radius.
+     * Ask after bed_changed: the frozen spheres of a patch fill the place where its parcel goes. */
+    bool (*room)(const silt_coupling *coupling, const double x[2], double radius);
+    void (*release)(silt_coupling *coupling, int n, const silt_release *release); // queued
+    void (*deposit)(silt_coupling *coupling, int grain);  // grain: index into grains(); becomes a frozen sphere, queued
+    /** the bed's surface changed (bed->revision): the frozen spheres along it are brought up to date, queued */
+    void (*bed_changed)(silt_coupling *coupling, const silt_bed *bed);
+    /** Runs n substeps: start returns at once, finish waits and refreshes grains() and bodies(). */
+    silt_status (*start)(silt_coupling *coupling, int n, silt_error *err);
+    silt_status (*finish)(silt_coupling *coupling, silt_error *err);
+    /** sediment that crossed an outlet of the scene from left to right since the start: kg per m of width, grains */
+    void (*left)(const silt_coupling *coupling, double *mass, int64_t *count);
+    silt_status (*save)(silt_coupling *coupling, silt_store *store, silt_error *err);
+    silt_status (*load_state)(silt_coupling **coupling, const silt_coupling_def *def, silt_store *store, silt_error *err);
+    int (*process)(const silt_coupling *coupling);
+    void (*close)(silt_coupling **coupling);
+} silt_coupling_type;
+
+/** dem-coupling/coupling.c; linked into the program, loads nothing before open */
+extern const silt_coupling_type silt_coupling_dem;
+
+#endif

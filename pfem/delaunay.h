@@ -1,0 +1,21 @@
+/** @file delaunay.h
+ * Delaunay triangulation of a cloud behind a C interface (CGAL, GPL-3+). The only C++ in silt is behind this header.
+ */
+#ifndef SILT_DELAUNAY_H
+#define SILT_DELAUNAY_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** Triangulates n points.
+ * @param x         2 n coordinates, m
+ * @param triangle  out, malloc'ed, 3 indices a triangle, counter-clockwise; order depends on the points only
+ * @param n_triangle out
+ * @return 0, or -1 when memory is exhausted. Coinciding points: the later one gets no triangle. */
+int silt_delaunay_2d(int n, const double *x, int **triangle, int *n_triangle);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

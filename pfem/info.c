@@ -1,0 +1,152 @@
+// what a scene asks for, or what stands in an output folder, in a few lines
+
+#include "output.h"
+
+#include <errno.h>
+#include <libfyaml.h>
+#include <sys/stat.h>
+
+// ---------------------------------------------------------------- a scene
+
+static void info_scene(const silt_scene *scene, FILE *to) {
+    const silt_fluid_def *fluid = &scene->fluid;
+    const silt_bed_def *bed = &scene->bed;
+    fprintf(to, "%s\n", scene->title && *scene->title ? scene->title : "untitled");
+    fprintf(to, "  scene      %s, hash %016llx\n", scene->path, (unsigned long long)scene->hash);
+    fprintf(to, "  time       to %g s, output every %g s\n", scene->time.end, scene->time.output);
+    if (fluid->on) {
+        double area = 0;
+        for (int i = 0; i < fluid->n_region; i++)
+            area += silt_region_area(&fluid->region[i]);
+        fprintf(to, "  water      %g kg/m3, %g Pa s, spacing %g m, %d regions of %g m2: about %.0f nodes\n",
+                fluid->density, fluid->viscosity, fluid->size, fluid->n_region, area, area / silt_square(fluid->size));
+        if (fluid->n_inlet || fluid->n_outlet)
+            fprintf(to, "  openings   %d inlets, %d outlets\n", fluid->n_inlet, fluid->n_outlet);
+    }
+    if (bed->on) {
+        double area = 0;
+        for (int i = 0; i < bed->n_region; i++)
+            area += silt_region_area(&bed->region[i]);
+        fprintf(to,
+                "  bed        %g kg/m3, porosity %g, %g J/m3, spacing %g m, %d regions of %g m2: about %.0f nodes\n",
+                bed->density, bed->porosity, bed->work, bed->size, bed->n_region, area, area / silt_square(bed->size));
+    }
+    if (scene->grains.on)
+        fprintf(to, "  grains     %d at the start, parcels of %g m\n", scene->grains.n_grain, scene->grains.parcel);
+    for (int i = 0; i < scene->n_body; i++)
+        fprintf(to, "  body       %s, %g kg/m3, %g m wide at (%g, %g)\n", scene->body[i].name, scene->body[i].density,
+                scene->body[i].scale, scene->body[i].at[0], scene->body[i].at[1]);
+    fprintf(to, "  walls      %d, gauges %d, checks %d\n", scene->n_wall, scene->n_gauge, scene->n_check);
+}
+
+// ---------------------------------------------------------------- an output folder
+
+static const char *info_text(struct fy_document *summary, const char *key) {
+    struct fy_node *node = fy_node_by_path(fy_document_root(summary), key, FY_NT, FYNWF_DONT_FOLLOW);
+    const char *text = node && fy_node_is_scalar(node) ? fy_node_get_scalar0(node) : NULL;
+    return text ? text : "";
+}
+
+static double info_number(struct fy_document *summary, const char *key) {
+    return atof(info_text(summary, key));
+}
+
+static void info_summary(struct fy_document *summary, FILE *to) {
+    static const char *const phase[PHASE_COUNT] = {
+#define X(name) #name,
+        SILT_PHASES(X)
+#undef X
+    };
+    const char *title = info_text(summary, "/title"), *message = info_text(summary, "/message");
+    fprintf(to, "%s\n", *title ? title : "untitled");
+    fprintf(to, "  status     %s%s%s (silt %s)\n", info_text(summary, "/status"), *message ? ": " : "", message,
+            info_text(summary, "/version"));
+    fprintf(to, "  reached    %g of %g s in %.0f steps\n", info_number(summary, "/time"),
+            info_number(summary, "/time_end"), info_number(summary, "/steps"));
+    fprintf(to, "  nodes      %.0f, grains %.0f\n", info_number(summary, "/nodes"), info_number(summary, "/grains"));
+    fprintf(to, "  took       %.4g s, %.3g us per node and step, %.0f MB\n", info_number(summary, "/seconds"),
+            info_number(summary, "/microseconds_per_node_step"), info_number(summary, "/peak_memory_bytes") / 1e6);
+    fprintf(to, "  phases    ");
+    for (int i = 0; i < PHASE_COUNT; i++) {
+        char key[80];
+        snprintf(key, sizeof key, "/phases/%s/seconds", phase[i]);
+        fprintf(to, " %s %.3g s%s", phase[i], info_number(summary, key), i + 1 < PHASE_COUNT ? "," : "\n");
+    }
+    fprintf(to, "  worst      volume error %.3e, sediment error %.3e, momentum error %.3e\n",
+            info_number(summary, "/worst_volume_error"), info_number(summary, "/worst_sediment_error"),
+            info_number(summary, "/worst_momentum_error"));
+    struct fy_node *checks = fy_node_by_path(fy_document_root(summary), "/checks", FY_NT, FYNWF_DONT_FOLLOW);
+    int n = checks ? fy_node_sequence_item_count(checks) : 0, passed = 0;
+    for (int i = 0; i < n; i++) {
+        char key[40];
+        snprintf(key, sizeof key, "/checks/%d/pass", i);
+        passed += strcmp(info_text(summary, key), "true") == 0;
+    }
+    fprintf(to, "  checks     %d of %d pass\n", passed > 0 ? passed : 0, n > 0 ? n : 0);
+}
+
+// step and time of the last whole row of a run that left no summary
+static void info_last_row(const char *out, FILE *to) {
+    char *path = silt_text("%s/history.csv", out), *line = NULL;
+    size_t capacity = 0;
+    ssize_t length;
+    long long step = -1;
+    double time = 0;
+    FILE *from = fopen(path, "r");
+    while (from && (length = getline(&line, &capacity, from)) > 0 && line[length - 1] == '\n')
+        sscanf(line, "%lld,%lf", &step, &time);
+    if (from)
+        fclose(from);
+    if (step >= 0)
+        fprintf(to, "  reached    %g s in %lld steps so far; no summary: it is running or was killed\n", time, step);
+    free(line);
+    free(path);
+}
+
+static silt_status info_out(const char *out, FILE *to, silt_error *err) {
+    char *path = silt_text("%s/summary.json", out), *history = silt_text("%s/history.csv", out);
+    struct stat file;
+    struct fy_document *summary = NULL;
+    silt_status status = SILT_OK;
+    if (stat(history, &file) != 0) {
+        status = silt_fail(err, SILT_INPUT, "%s: no output of a run stands there, history.csv is absent", out);
+        goto done;
+    }
+    if (stat(path, &file) == 0)
+        summary = fy_document_build_from_file(&(struct fy_parse_cfg){.flags = FYPCF_QUIET | FYPCF_JSON_AUTO}, path);
+    if (summary) {
+        info_summary(summary, to);
+    } else {
+        fprintf(to, "%s\n", out);
+        info_last_row(out, to);
+    }
+    silt_frame_entry *entry = NULL;
+    int n = silt_frame_index(out, &entry);
+    fprintf(to, "  frames     %d", n);
+    fprintf(to, n > 0 ? ", to %g s\n" : "\n", n > 0 ? entry[n - 1].time : 0);
+    free(entry);
+    for (int k = 0; k < 2; k++) {
+        char *checkpoint = silt_text("%s/checkpoint-%c.h5", out, "ab"[k]);
+        if (stat(checkpoint, &file) == 0)
+            fprintf(to, "  checkpoint %s, %.1f MB\n", checkpoint, file.st_size / 1e6);
+        free(checkpoint);
+    }
+done:
+    fy_document_destroy(summary);
+    free(history);
+    free(path);
+    return status;
+}
+
+silt_status silt_info(const char *path, FILE *to, silt_error *err) {
+    struct stat file;
+    if (stat(path, &file) != 0)
+        return silt_fail(err, SILT_INPUT, "%s: cannot be read (%s)", path, strerror(errno));
+    if (S_ISDIR(file.st_mode))
+        return info_out(path, to, err);
+    silt_scene *scene = NULL;
+    SILT_TRY(silt_scene_read(path, 0, NULL, &scene, err));
+    info_scene(scene, to);
+    silt_scene_free(&scene);
+    return SILT_OK;
+}

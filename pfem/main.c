@@ -1,0 +1,239 @@
+// the command line: silt COMMAND ...; prints what the library reports and turns its status into the exit code
+
+#include "output.h"
+
+#include <argp.h>
+#include <errno.h>
+#include <sys/stat.h>
+
+const char *argp_program_version = "silt " SILT_VERSION;
+
+/** everything that any command takes */
+typedef struct main_arguments {
+    const struct main_command *command;
+    const char *path; // SCENE, OUT or KEY
+    int n_set, set_capacity;
+    const char **set; // owned, -D
+    silt_run_def run;
+    int frame; // -1 all, -2 the last
+    const char *field, *to;
+} main_arguments;
+
+typedef struct main_command {
+    const char *name, *argument; // argument: its name; in brackets when it may be absent
+    const char *document;
+    const char *options; // the keys of main_options that it takes
+    silt_status (*run)(const main_arguments *arguments, silt_error *err);
+} main_command;
+
+// ---------------------------------------------------------------- options
+
+enum { OPTION_UNTIL = 'u', OPTION_THREADS = 't', OPTION_FORCE = 'f', OPTION_FRAME = 'n', OPTION_FIELD = 'c' };
+#define LONG_ONLY(key) ((key) + 256)
+
+static const struct argp_option main_options[] = {
+    {"output", 'o', "OUT", 0, "output folder; default: the scene's folder name plus .out in the current folder", 0},
+    {NULL, 'D', "KEY=VALUE", 0, "set a key of the scene, for example fluid.size=0.01 or bodies.temple.density=700", 0},
+    {"until", LONG_ONLY(OPTION_UNTIL), "T", 0, "run to this time in s instead of the scene's time.end", 0},
+    {"threads", LONG_ONLY(OPTION_THREADS), "N", 0, "threads; default: all", 0},
+    {"quiet", 'q', NULL, 0, "no progress line", 0},
+    {"force", LONG_ONLY(OPTION_FORCE), NULL, 0, "replace an output folder that is there", 0},
+    {"worker", LONG_ONLY('w'), "PATH", OPTION_HIDDEN, "the silt-dem program", 0},
+    {"frame", LONG_ONLY(OPTION_FRAME), "N|all", 0, "the frame to draw; default: the last", 0},
+    {"field", LONG_ONLY(OPTION_FIELD), "NAME", 0, "speed (default), pressure, porosity, mesh or bed", 0},
+    {"to", LONG_ONLY('d'), "FOLDER", 0, "where the pictures go; default: OUT", 0},
+};
+enum { N_OPTION = sizeof main_options / sizeof main_options[0] };
+
+static double main_number(struct argp_state *state, const char *option, const char *text, bool whole) {
+    char *end;
+    errno = 0;
+    double value = strtod(text, &end);
+    if (end == text || *end || errno || !isfinite(value) || value <= 0 ||
+        (whole && (value != floor(value) || value > 1e6)))
+        argp_error(state, "%s %s: a positive %s is needed", option, text, whole ? "whole number" : "number");
+    return value;
+}
+
+static error_t main_option(int key, char *text, struct argp_state *state) {
+    main_arguments *a = state->input;
+    char *end;
+    switch (key) {
+    case 'o':
+        a->run.out = text;
+        return 0;
+    case 'D':
+        if (!strchr(text, '=') || *text == '=')
+            argp_error(state, "-D %s: KEY=VALUE is needed", text);
+        SILT_RESERVE(a->set, a->set_capacity, a->n_set + 1);
+        a->set[a->n_set++] = text;
+        return 0;
+    case 'q':
+        a->run.quiet = true;
+        return 0;
+    case LONG_ONLY(OPTION_UNTIL):
+        a->run.until = main_number(state, "--until", text, false);
+        return 0;
+    case LONG_ONLY(OPTION_THREADS):
+        a->run.threads = (int)main_number(state, "--threads", text, true);
+        return 0;
+    case LONG_ONLY(OPTION_FORCE):
+        a->run.force = true;
+        return 0;
+    case LONG_ONLY('w'):
+        a->run.worker = text;
+        return 0;
+    case LONG_ONLY(OPTION_FRAME):
+        a->frame = strcmp(text, "all") == 0 ? -1 : (int)strtol(text, &end, 10);
+        if (a->frame < -1 || (a->frame >= 0 && (end == text || *end)))
+            argp_error(state, "--frame %s: a frame's number or all is needed", text);
+        return 0;
+    case LONG_ONLY(OPTION_FIELD):
+        a->field = text;
+        return 0;
+    case LONG_ONLY('d'):
+        a->to = text;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (a->path)
+            argp_error(state, "one argument too many: %s", text);
+        a->path = text;
+        return 0;
+    case ARGP_KEY_END:
+        if (!a->path && *a->command->argument != '[')
+            argp_error(state, "%s is missing", a->command->argument);
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+// ---------------------------------------------------------------- commands
+
+static silt_status main_check(const main_arguments *a, silt_error *err) {
+    silt_scene *scene = NULL;
+    SILT_TRY(silt_scene_read(a->path, a->n_set, a->set, &scene, err));
+    printf("%s: ok\n", a->path);
+    silt_scene_free(&scene);
+    return SILT_OK;
+}
+
+static silt_status main_run(const main_arguments *a, silt_error *err) {
+    silt_scene *scene = NULL;
+    SILT_TRY(silt_scene_read(a->path, a->n_set, a->set, &scene, err));
+    silt_status status = silt_scene_run(scene, &a->run, err);
+    silt_scene_free(&scene);
+    return status;
+}
+
+// the folder of a run that the command works on
+static silt_status main_out(const main_arguments *a, silt_error *err) {
+    struct stat file;
+    if (stat(a->path, &file) != 0)
+        return silt_fail(err, SILT_INPUT, "%s: cannot be read (%s)", a->path, strerror(errno));
+    if (!S_ISDIR(file.st_mode))
+        return silt_fail(err, SILT_INPUT, "%s: is a file, %s takes the output folder of a run", a->path,
+                         a->command->name);
+    return SILT_OK;
+}
+
+static silt_status main_resume(const main_arguments *a, silt_error *err) {
+    SILT_TRY(main_out(a, err));
+    silt_run_def run = a->run;
+    run.out = a->path;
+    return silt_run_resume(&run, err);
+}
+
+static silt_status main_verify(const main_arguments *a, silt_error *err) {
+    SILT_TRY(main_out(a, err));
+    return silt_verify(a->path, stdout, err);
+}
+
+static silt_status main_draw(const main_arguments *a, silt_error *err) {
+    SILT_TRY(main_out(a, err));
+    if (a->to && mkdir(a->to, 0777) != 0 && errno != EEXIST)
+        return silt_fail(err, SILT_FAILED, "%s: cannot be made (%s)", a->to, strerror(errno));
+    return silt_draw(a->path, a->frame, a->field, a->to, stdout, err);
+}
+
+static silt_status main_info(const main_arguments *a, silt_error *err) {
+    return silt_info(a->path, stdout, err);
+}
+
+static silt_status main_help(const main_arguments *a, silt_error *err);
+
+static const main_command main_commands[] = {
+    {"check", "SCENE", "Reads a scene and reports all its errors at once, without running it.", "D", main_check},
+    {"run", "SCENE", "Runs a scene from its start.", "oDutqfw", main_run},
+    {"resume", "OUT", "Goes on from the newest whole checkpoint in OUT; with --until also a finished run.", "utqw",
+     main_resume},
+    {"verify", "OUT", "Holds the results in OUT against the checks of the scene, a line per check.", "", main_verify},
+    {"draw", "OUT", "Draws frames of a run as PNG pictures.", "ncd", main_draw},
+    {"info", "OUT|SCENE", "Tells what a scene asks for, or what stands in an output folder.", "", main_info},
+    {"help", "[KEY]", "Explains the keys of a scene: all of them, a block, or one, for example fluid.size.", "",
+     main_help},
+};
+enum { N_COMMAND = sizeof main_commands / sizeof main_commands[0] };
+
+static void main_usage(FILE *to) {
+    fprintf(to, "silt %s: water, bed, grains and rigid objects by particle finite elements and discrete elements\n\n",
+            SILT_VERSION);
+    for (int i = 0; i < N_COMMAND; i++)
+        fprintf(to, "  silt %-7s %-10s %s\n", main_commands[i].name, main_commands[i].argument,
+                main_commands[i].document);
+    fprintf(to, "\nsilt COMMAND --help lists a command's options, silt --version tells the version.\n"
+                "Exit code: 0 done, 1 the run or a check failed, 2 wrong usage or scene, 3 stopped by a signal with a "
+                "checkpoint written.\n");
+}
+
+static silt_status main_help(const main_arguments *a, silt_error *err) {
+    return silt_scene_help(a->path, stdout, err);
+}
+
+// reads the command's arguments with the options that it takes; a wrong one ends the program with code 2
+static void main_parse(main_arguments *a, int argc, char **argv) {
+    struct argp_option option[N_OPTION + 1] = {0};
+    int n = 0;
+    for (int i = 0; i < N_OPTION; i++)
+        if (strchr(a->command->options, main_options[i].key & 255))
+            option[n++] = main_options[i];
+    char name[32];
+    snprintf(name, sizeof name, "silt %s", a->command->name);
+    argv[0] = name;
+    struct argp argp = {option, main_option, a->command->argument, a->command->document, NULL, NULL, NULL};
+    argp_err_exit_status = SILT_INPUT;
+    argp_parse(&argp, argc, argv, 0, NULL, a);
+}
+
+int main(int argc, char **argv) {
+    main_arguments a = {.frame = -2};
+    silt_error err = {0};
+    const char *word = argc > 1 ? argv[1] : "";
+    if (strcmp(word, "--version") == 0 || strcmp(word, "-V") == 0) {
+        puts(argp_program_version);
+        return SILT_OK;
+    }
+    if (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0 || strcmp(word, "-?") == 0) {
+        main_usage(stdout);
+        return SILT_OK;
+    }
+    for (int i = 0; i < N_COMMAND; i++)
+        if (strcmp(word, main_commands[i].name) == 0)
+            a.command = &main_commands[i];
+    if (!a.command) {
+        if (*word)
+            fprintf(stderr, "silt: %s is no command\n\n", word);
+        main_usage(stderr);
+        return SILT_INPUT;
+    }
+    main_parse(&a, argc - 1, argv + 1);
+    silt_status status = a.command->run(&a, &err);
+    // stdout first: the reason stands below what was printed
+    bool lost = fflush(stdout) != 0;
+    if (status)
+        fprintf(stderr, "%s%s", err.text, *err.text && err.text[strlen(err.text) - 1] == '\n' ? "" : "\n");
+    else if (lost)
+        fprintf(stderr, "silt: standard output cannot be written (%s)\n", strerror(errno));
+    free(a.set);
+    return status ? (int)status : lost;
+}

@@ -1,0 +1,127 @@
+// the water's triangles: adjacency, boundary and measures; what is water is decided in remesh.c
+#include "pfem.h"
+
+double silt_cell_area(const double *x, const int cell[3]) {
+    const double *a = x + 2 * cell[0], *b = x + 2 * cell[1], *c = x + 2 * cell[2];
+    return 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+}
+
+double silt_mesh_volume(const silt_mesh *mesh, const double *x) {
+    double sum = 0;
+    for (int e = 0; e < mesh->n_cell; e++)
+        sum += silt_cell_area(x, mesh->cell[e]);
+    return sum;
+}
+
+static silt_edge_kind edge_kind(const silt_nodes *nodes, int a, int b) {
+    const silt_node_kind ka = nodes->kind[a], kb = nodes->kind[b];
+    if (ka == NODE_INLET && kb == NODE_INLET)
+        return EDGE_INLET;
+    if (ka == NODE_BED && kb == NODE_BED)
+        return EDGE_BED;
+    if (ka == NODE_BODY && kb == NODE_BODY && nodes->owner[a] == nodes->owner[b])
+        return EDGE_BODY;
+    // on one wall segment, tank corners count for both of theirs; inlets and the bed end on walls
+    for (int s = 0; s < 2; s++)
+        for (int t = 0; t < 2; t++)
+            if (nodes->wall[a][s] >= 0 && nodes->wall[a][s] == nodes->wall[b][t])
+                return EDGE_WALL;
+    const bool fixed_a = ka == NODE_CORNER || ka == NODE_BED || ka == NODE_INLET;
+    const bool fixed_b = kb == NODE_CORNER || kb == NODE_BED || kb == NODE_INLET;
+    if (fixed_a && fixed_b)
+        return EDGE_WALL;
+    if ((fixed_a && nodes->wall[b][0] >= 0) || (fixed_b && nodes->wall[a][0] >= 0))
+        return EDGE_WALL;
+    return EDGE_FREE;
+}
+
+static int compare_int(const void *a, const void *b) {
+    return (*(const int *)a > *(const int *)b) - (*(const int *)a < *(const int *)b);
+}
+
+void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes) {
+    const int n = nodes->count;
+    mesh->revision++;
+    mesh->n_node = n;
+    SILT_RESERVE(mesh->wet, mesh->wet_capacity, n + 1);
+    SILT_RESERVE(mesh->surface, mesh->surface_capacity, n + 1);
+    SILT_RESERVE(mesh->node_cell_start, mesh->start_capacity, n + 1);
+    SILT_RESERVE(mesh->neighbour_start, mesh->neighbour_start_capacity, n + 1);
+    SILT_RESERVE(mesh->node_cell, mesh->node_cell_capacity, 3 * mesh->n_cell + 1);
+    SILT_RESERVE(mesh->neighbour, mesh->neighbour_capacity, 7 * mesh->n_cell + n + 1);
+    memset(mesh->wet, 0, (size_t)n);
+    memset(mesh->surface, 0, (size_t)n);
+
+    // cells of every node, rising
+    int *start = mesh->node_cell_start;
+    memset(start, 0, (size_t)(n + 1) * sizeof *start);
+    for (int e = 0; e < mesh->n_cell; e++)
+        for (int a = 0; a < 3; a++)
+            start[mesh->cell[e][a]]++;
+    int sum = 0;
+    for (int i = 0; i <= n; i++) {
+        const int count = i < n ? start[i] : 0;
+        sum += count;
+        start[i] = sum;
+    }
+    for (int e = mesh->n_cell - 1; e >= 0; e--)
+        for (int a = 0; a < 3; a++)
+            mesh->node_cell[--start[mesh->cell[e][a]]] = e;
+
+    // neighbours, the node itself included, rising; an edge that only one cell has is boundary
+    mesh->n_edge = 0;
+    int filled = 0;
+    for (int i = 0; i < n; i++) {
+        int *list = mesh->neighbour + filled, count = 0;
+        mesh->neighbour_start[i] = filled;
+        list[count++] = i;
+        for (int k = start[i]; k < start[i + 1]; k++)
+            for (int a = 0; a < 3; a++) {
+                const int j = mesh->cell[mesh->node_cell[k]][a];
+                int known = 0;
+                while (known < count && list[known] != j)
+                    known++;
+                if (known == count)
+                    list[count++] = j;
+            }
+        qsort(list, (size_t)count, sizeof *list, compare_int);
+        filled += count;
+        mesh->wet[i] = start[i + 1] > start[i];
+
+        // edges that leave i counter-clockwise in one cell and come back in none
+        for (int k = start[i]; k < start[i + 1]; k++) {
+            const int *cell = mesh->cell[mesh->node_cell[k]];
+            const int a = cell[0] == i ? 0 : cell[1] == i ? 1 : 2, j = cell[(a + 1) % 3];
+            bool twice = false;
+            for (int m = start[i]; m < start[i + 1] && !twice; m++) {
+                const int *other = mesh->cell[mesh->node_cell[m]];
+                const int b = other[0] == i ? 0 : other[1] == i ? 1 : 2;
+                twice = other[(b + 2) % 3] == j;
+            }
+            if (twice)
+                continue;
+            SILT_RESERVE(mesh->edge, mesh->edge_capacity, mesh->n_edge + 1);
+            SILT_RESERVE(mesh->edge_kind, mesh->edge_kind_capacity, mesh->n_edge + 1);
+            mesh->edge[mesh->n_edge][0] = i;
+            mesh->edge[mesh->n_edge][1] = j;
+            mesh->edge_kind[mesh->n_edge++] = (uint8_t)edge_kind(nodes, i, j);
+        }
+    }
+    mesh->neighbour_start[n] = filled;
+    for (int k = 0; k < mesh->n_edge; k++)
+        if (mesh->edge_kind[k] == EDGE_FREE)
+            mesh->surface[mesh->edge[k][0]] = mesh->surface[mesh->edge[k][1]] = 1;
+}
+
+void silt_mesh_clear(silt_mesh *mesh) {
+    free(mesh->cell);
+    free(mesh->edge);
+    free(mesh->edge_kind);
+    free(mesh->wet);
+    free(mesh->surface);
+    free(mesh->node_cell_start);
+    free(mesh->node_cell);
+    free(mesh->neighbour_start);
+    free(mesh->neighbour);
+    *mesh = (silt_mesh){0};
+}

@@ -1,0 +1,254 @@
+// nodes to their new places: water with its velocity, drops in free flight, inlets back to their line, bodies with theirs
+#include "run.h"
+
+void silt_run_prescribe(silt_run *run) {
+    const silt_scene *scene = run->scene;
+    silt_nodes *nodes = &run->nodes;
+    const silt_body_state *bodies = run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
+    for (int i = 0; i < nodes->count; i++) {
+        double *v = nodes->v + 2 * i;
+        if (nodes->kind[i] == NODE_INLET) {
+            const silt_inlet *inlet = &scene->fluid.inlet[nodes->owner[i]];
+            const double factor = inlet->series.n_row ? silt_series_at(&inlet->series, 1, run->time + 0.5 * run->dt) : 1;
+            v[0] = factor * inlet->velocity[0];
+            v[1] = factor * inlet->velocity[1];
+        } else if (nodes->kind[i] == NODE_BODY && bodies) {
+            const struct silt_body *body = &bodies->body[nodes->owner[i]];
+            v[0] = body->v[0] - body->w[2] * (nodes->x[2 * i + 1] - body->x[1]);
+            v[1] = body->v[1] + body->w[2] * (nodes->x[2 * i] - body->x[0]);
+        } else if (nodes->kind[i] == NODE_CORNER)
+            v[0] = v[1] = 0;
+    }
+}
+
+// drops: free flight, along walls where they lie on one
+static void fly(silt_run *run, int i) {
+    silt_nodes *nodes = &run->nodes;
+    double *x = nodes->x + 2 * i, *v = nodes->v + 2 * i;
+    const double dt = run->dt, *g = run->scene->gravity;
+    double a[2] = {g[0], g[1]};
+    const int s = nodes->wall[i][0];
+    if (s >= 0) {
+        const double *n = run->walls.normal[s], an = a[0] * n[0] + a[1] * n[1];
+        const bool held = an <= 0;
+        if (held && (nodes->wall[i][1] >= 0 || !run->walls.slip[s])) {
+            v[0] = v[1] = 0; // stuck, or in a corner
+            return;
+        }
+        if (held) {
+            a[0] -= an * n[0];
+            a[1] -= an * n[1];
+        } else
+            nodes->wall[i][0] = nodes->wall[i][1] = -1;
+    }
+    for (int d = 0; d < 2; d++) {
+        x[d] += dt * (v[d] + 0.5 * dt * a[d]);
+        v[d] += dt * a[d];
+    }
+}
+
+// surface nodes that a wall would have to pull on let go
+static void let_go(silt_run *run) {
+    silt_nodes *nodes = &run->nodes;
+    const silt_fluid *fluid = &run->fluid;
+    for (int i = 0; i < fluid->n_node; i++) {
+        const int s = nodes->wall[i][0];
+        if (nodes->kind[i] != NODE_FLUID || s < 0 || !run->mesh.wet[i] || !run->mesh.surface[i])
+            continue;
+        const double *n = run->walls.normal[s], *r = fluid->reaction + 2 * i;
+        const double pull = -(r[0] * n[0] + r[1] * n[1]);
+        const double weight = fluid->mass[i] * hypot(run->scene->gravity[0], run->scene->gravity[1]);
+        if (pull > 0.05 * weight && pull > 0)
+            nodes->wall[i][0] = nodes->wall[i][1] = -1;
+    }
+}
+
+// bodies where the discrete elements have put them
+static void place_bodies(silt_run *run) {
+    if (!run->n_body_before)
+        return;
+    const struct silt_body *before = run->body_before;
+    const silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    silt_nodes *nodes = &run->nodes;
+    for (int i = 0; i < nodes->count; i++) {
+        if (nodes->kind[i] != NODE_BODY)
+            continue;
+        const struct silt_body *old = &before[nodes->owner[i]], *now = &bodies->body[nodes->owner[i]];
+        // turn from old to new about z: q_now * conj(q_old)
+        const double w = now->q[0] * old->q[0] + now->q[3] * old->q[3], z = now->q[3] * old->q[0] - now->q[0] * old->q[3];
+        const double c = 1 - 2 * z * z, s = 2 * w * z;
+        const double rx = run->x_old[2 * i] - old->x[0], ry = run->x_old[2 * i + 1] - old->x[1];
+        nodes->x[2 * i] = now->x[0] + c * rx - s * ry;
+        nodes->x[2 * i + 1] = now->x[1] + s * rx + c * ry;
+    }
+}
+
+// water that crossed an outlet, or left the box of the scene
+static void let_out(silt_run *run) {
+    silt_nodes *nodes = &run->nodes;
+    const double rho = run->scene->fluid.density;
+    for (int i = 0; i < nodes->count; i++) {
+        if (nodes->kind[i] != NODE_FLUID || run->memory.dead[i])
+            continue;
+        const double *x = nodes->x + 2 * i, *old = run->x_old + 2 * i;
+        bool gone = x[0] < run->box_lo[0] || x[0] > run->box_hi[0] || x[1] < run->box_lo[1] || x[1] > run->box_hi[1];
+        for (int k = 0; k < run->scene->fluid.n_outlet && !gone; k++) {
+            const silt_outlet *outlet = &run->scene->fluid.outlet[k];
+            const double dx = outlet->to[0] - outlet->from[0], dy = outlet->to[1] - outlet->from[1];
+            const double side = dx * (x[1] - outlet->from[1]) - dy * (x[0] - outlet->from[0]);
+            const double before = dx * (old[1] - outlet->from[1]) - dy * (old[0] - outlet->from[0]);
+            const double along = (dx * (x[0] - outlet->from[0]) + dy * (x[1] - outlet->from[1])) / (dx * dx + dy * dy);
+            gone = side < 0 && before >= -1e-12 * (dx * dx + dy * dy) && along > -0.05 && along < 1.05;
+        }
+        if (!gone)
+            continue;
+        // it takes its share of its cells along, and what it owed
+        double share = 0;
+        for (int k = i < run->mesh.n_node ? run->mesh.node_cell_start[i] : 0; i < run->mesh.n_node && k < run->mesh.node_cell_start[i + 1]; k++)
+            share += run->memory.area[run->mesh.node_cell[k]] / 3;
+        run->ledger.outflow_mass += rho * (share + nodes->debt[i]);
+        nodes->debt[i] = -share;
+        run->memory.dead[i] = 1;
+    }
+}
+
+// water nodes that ended up in something solid: flying ones are put outside, wet ones leave their volume to their cells
+static void expel(silt_run *run) {
+    silt_nodes *nodes = &run->nodes;
+    if (!run->barrier.bed && !run->barrier.bodies)
+        return;
+    const silt_barrier solid = {.bed = run->barrier.bed, .bodies = run->barrier.bodies};
+    for (int i = 0; i < nodes->count; i++) {
+        if (nodes->kind[i] != NODE_FLUID || run->memory.dead[i] || !silt_barrier_contains(&solid, nodes->x + 2 * i))
+            continue;
+        const bool wet = i < run->mesh.n_node && run->mesh.wet[i];
+        if (wet) {
+            run->memory.dead[i] = 1;
+            continue;
+        }
+        // back where it came from, at rest; inside there too: to the nearest node of the water, whose volume grows
+        const double *old = run->x_old + 2 * i;
+        if (!silt_barrier_contains(&solid, old)) {
+            memcpy(nodes->x + 2 * i, old, 2 * sizeof(double));
+            nodes->v[2 * i] = nodes->v[2 * i + 1] = 0;
+        } else
+            run->memory.dead[i] = 1;
+    }
+}
+
+// slip on the fixed nodes of the bed: the water that stands there now came from upstream along the surface
+static void carry_slip(silt_run *run) {
+    if (!run->scene->bed.on || run->scene->bed.condition == WALL_NO_SLIP)
+        return;
+    const silt_mesh *mesh = &run->mesh;
+    const silt_fluid *fluid = &run->fluid;
+    silt_nodes *nodes = &run->nodes;
+    double *fresh = run->fluid.scratch;
+    memcpy(fresh, nodes->v, 2 * (size_t)fluid->n_node * sizeof(double));
+    for (int k = 0; k < mesh->n_edge; k++) {
+        if (mesh->edge_kind[k] != EDGE_BED)
+            continue;
+        for (int c = 0; c < 2; c++) {
+            const int i = mesh->edge[k][c], up = mesh->edge[k][1 - c];
+            if (fluid->hold[i] != 1)
+                continue;
+            const double dx = run->x_old[2 * i] - run->x_old[2 * up], dy = run->x_old[2 * i + 1] - run->x_old[2 * up + 1];
+            const double share = run->dt * (fluid->w[2 * i] * dx + fluid->w[2 * i + 1] * dy) / (dx * dx + dy * dy);
+            for (int d = 0; d < 2 && share > 0; d++)
+                fresh[2 * i + d] += silt_min(share, 1) * (nodes->v[2 * up + d] - nodes->v[2 * i + d]);
+        }
+    }
+    for (int i = 0; i < fluid->n_node; i++)
+        if (nodes->kind[i] == NODE_BED && fluid->hold[i] == 1) {
+            const double *n = fluid->normal + 2 * i, vn = fresh[2 * i] * n[0] + fresh[2 * i + 1] * n[1];
+            for (int d = 0; d < 2; d++)
+                nodes->v[2 * i + d] = fresh[2 * i + d] - vn * n[d];
+        }
+}
+
+// bed cells that became water, and water that became bed, in the numbers of the nodes
+static void remember_bed(silt_run *run) {
+    silt_memory *memory = &run->memory;
+    const int *node = run->bed.fluid_node;
+    for (int k = 0; k < run->n_freed; k++) {
+        const int cell[3] = {node[run->freed[k][0]], node[run->freed[k][1]], node[run->freed[k][2]]};
+        if (cell[0] < 0 || cell[1] < 0 || cell[2] < 0)
+            continue;
+        SILT_RESERVE(memory->cell, memory->cell_capacity, memory->n_cell + 1);
+        SILT_RESERVE(memory->area, memory->area_capacity, memory->n_cell + 1);
+        memcpy(memory->cell[memory->n_cell], cell, sizeof cell);
+        memory->area[memory->n_cell++] = run->freed_area[k];
+    }
+    for (int k = 0; k < run->n_grown; k++) {
+        const int cell[3] = {node[run->grown[k][0]], node[run->grown[k][1]], node[run->grown[k][2]]};
+        if (cell[0] < 0 || cell[1] < 0 || cell[2] < 0)
+            continue;
+        SILT_RESERVE(memory->taken, memory->taken_capacity, memory->n_taken + 1);
+        SILT_RESERVE(memory->taken_area, memory->taken_area_capacity, memory->n_taken + 1);
+        memcpy(memory->taken[memory->n_taken], cell, sizeof cell);
+        memory->taken_area[memory->n_taken++] = run->grown_area[k];
+    }
+    run->n_freed = run->n_grown = 0;
+    for (int k = 0; k < run->bed.n_node; k++)
+        if (!run->bed.alive[k])
+            run->bed.fluid_node[k] = -1; // water now
+}
+
+silt_status silt_run_move(silt_run *run, silt_error *err) {
+    const silt_scene *scene = run->scene;
+    silt_nodes *nodes = &run->nodes;
+    silt_mesh *mesh = &run->mesh;
+    const double h = scene->fluid.size, rho = scene->fluid.density;
+    const int n = nodes->count;
+
+    const double since = silt_seconds();
+    // material motion; all nodes, so that the old cells hold what continuity gave them
+    const double before = silt_mesh_volume(mesh, nodes->x);
+    let_go(run);
+    for (int i = 0; i < n; i++)
+        if (mesh->wet[i])
+            for (int d = 0; d < 2; d++)
+                nodes->x[2 * i + d] += run->dt * run->fluid.w[2 * i + d];
+    const double moved = silt_mesh_volume(mesh, nodes->x);
+    // inlets stay on their line: what they leave behind them is new water; slip nodes of the bed stay too
+    for (int i = 0; i < n; i++)
+        if (nodes->kind[i] == NODE_INLET)
+            memcpy(nodes->x + 2 * i, run->x_old + 2 * i, 2 * sizeof(double));
+    const double fed = silt_mesh_volume(mesh, nodes->x);
+    run->ledger.inflow_mass += rho * (fed - moved);
+    run->ledger.volume_solved += run->fluid.solved_volume;
+    run->ledger.volume_moved += moved - before - run->fluid.solved_volume - run->fluid.given_back;
+    silt_memory_take(&run->memory, mesh, nodes);
+
+    // from here on positions are mended: what that does to the volume is booked by the rebuild
+    for (int i = 0; i < n; i++) {
+        if (nodes->kind[i] == NODE_BED && run->fluid.hold[i] == 1)
+            memcpy(nodes->x + 2 * i, run->x_old + 2 * i, 2 * sizeof(double));
+        if (!mesh->wet[i] && nodes->kind[i] == NODE_FLUID)
+            fly(run, i);
+    }
+    carry_slip(run);
+    place_bodies(run);
+    silt_run_bed_sync(run);
+    silt_memory_extend(&run->memory, nodes->count);
+    SILT_RESERVE(run->x_old, run->x_old_capacity, 2 * nodes->count + 2);
+    for (int k = 2 * n; k < 2 * nodes->count; k++)
+        run->x_old[k] = nodes->x[k];
+    remember_bed(run);
+    silt_walls_contact(&run->walls, nodes, run->x_old, run->memory.interior, h);
+    let_out(run);
+    expel(run);
+    silt_mesh_refine(mesh, nodes, &run->memory, h);
+
+    const double middle = silt_seconds();
+    run->phase[PHASE_move] += middle - since;
+    SILT_RESERVE(run->map, run->map_capacity, nodes->count + 1);
+    SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
+    run->ledger.volume_reconnected += run->memory.reconnected;
+    for (int k = 0; k < run->bed.n_node; k++)
+        if (run->bed.fluid_node[k] >= 0)
+            run->bed.fluid_node[k] = run->map[run->bed.fluid_node[k]];
+    silt_locator_build(&run->locator, mesh, nodes->x, h);
+    run->phase[PHASE_mesh] += silt_seconds() - middle;
+    return SILT_OK;
+}

@@ -1,0 +1,94 @@
+// the particles: arrays of nodes that grow and shrink
+#include "pfem.h"
+
+void silt_nodes_clear(silt_nodes *nodes) {
+    free(nodes->x);
+    free(nodes->v);
+    free(nodes->p);
+    free(nodes->debt);
+    free(nodes->id);
+    free(nodes->kind);
+    free(nodes->owner);
+    free(nodes->wall);
+    *nodes = (silt_nodes){0};
+}
+
+static void nodes_reserve(silt_nodes *nodes, int need) {
+    if (need <= nodes->capacity)
+        return;
+    int capacity = nodes->capacity ? 2 * nodes->capacity : 256;
+    while (capacity < need)
+        capacity *= 2;
+#define GROW(field, per)                                                                                               \
+    do {                                                                                                               \
+        int have = nodes->capacity * (per);                                                                            \
+        nodes->field = silt_grow(nodes->field, &have, capacity * (per), sizeof *nodes->field);                         \
+    } while (0)
+    GROW(x, 2);
+    GROW(v, 2);
+    GROW(p, 1);
+    GROW(debt, 1);
+    GROW(id, 1);
+    GROW(kind, 1);
+    GROW(owner, 1);
+    GROW(wall, 1);
+#undef GROW
+    nodes->capacity = capacity;
+}
+
+int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double x[2]) {
+    const int i = nodes->count;
+    nodes_reserve(nodes, i + 1);
+    nodes->count++;
+    for (int d = 0; d < 2; d++) {
+        nodes->x[2 * i + d] = x[d];
+        nodes->v[2 * i + d] = 0;
+    }
+    nodes->p[i] = 0;
+    nodes->debt[i] = 0;
+    nodes->id[i] = nodes->next_id++;
+    nodes->kind[i] = (uint8_t)kind;
+    nodes->owner[i] = owner;
+    nodes->wall[i][0] = nodes->wall[i][1] = -1;
+    return i;
+}
+
+void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map) {
+    int k = 0;
+    for (int i = 0; i < nodes->count; i++) {
+        if (dead[i]) {
+            map[i] = -1;
+            continue;
+        }
+        map[i] = k;
+        if (k != i) {
+            for (int d = 0; d < 2; d++) {
+                nodes->x[2 * k + d] = nodes->x[2 * i + d];
+                nodes->v[2 * k + d] = nodes->v[2 * i + d];
+                nodes->wall[k][d] = nodes->wall[i][d];
+            }
+            nodes->p[k] = nodes->p[i];
+            nodes->debt[k] = nodes->debt[i];
+            nodes->id[k] = nodes->id[i];
+            nodes->kind[k] = nodes->kind[i];
+            nodes->owner[k] = nodes->owner[i];
+        }
+        k++;
+    }
+    nodes->count = k;
+}
+
+int silt_outline_points(int n, const double *outline, double h, double **xy) {
+    int count = 0, capacity = 0;
+    double *out = NULL;
+    for (int k = 0; k < n; k++) {
+        const double *a = outline + 2 * k, *b = outline + 2 * ((k + 1) % n);
+        const int pieces = (int)silt_max(1, floor(hypot(b[0] - a[0], b[1] - a[1]) / h + 0.5));
+        SILT_RESERVE(out, capacity, 2 * (count + pieces));
+        for (int m = 0; m < pieces; m++, count++)
+            for (int d = 0; d < 2; d++)
+                out[2 * count + d] = a[d] + (b[d] - a[d]) * m / pieces;
+    }
+    *xy = out;
+    return count;
+}

@@ -1,0 +1,102 @@
+/** @file output.h
+ * What a run leaves behind: history.csv, frames, summary.json, pictures, checks.
+ */
+#ifndef SILT_OUTPUT_H
+#define SILT_OUTPUT_H
+
+#include "bed.h"
+
+#define SILT_PHASES(X) X(mesh) X(assemble) X(solve) X(bed) X(dem) X(move) X(output)
+typedef enum {
+#define X(name) PHASE_##name,
+    SILT_PHASES(X)
+#undef X
+        PHASE_COUNT
+} silt_phase;
+
+/** everything that output may look at, borrowed from the run; absent parts are NULL */
+typedef struct silt_view {
+    const silt_scene *scene;
+    const silt_nodes *nodes;      // NULL without fluid
+    const silt_mesh *mesh;
+    const silt_locator *locator;  // of mesh at the present positions
+    const double *solid;          // 1 - porosity per node, NULL: 0
+    const silt_bed *bed;
+    const silt_grain_state *grains;
+    const silt_body_state *bodies;
+    const silt_ledger *ledger;
+    int64_t step;
+    double time, dt;
+    double wall[PHASE_COUNT]; // s, of the last step
+    int iterations;           // of the last step
+} silt_view;
+
+// gauge.c ------------------------------------------------------------------------------------------
+typedef struct silt_gauges silt_gauges; // keeps what gauges need from the start (bed level)
+silt_status silt_gauges_create(silt_gauges **gauges, const silt_view *start, silt_error *err);
+void silt_gauges_free(silt_gauges **gauges);
+int silt_gauges_count(const silt_scene *scene);                        // number of history columns
+void silt_gauges_name(const silt_scene *scene, int column, char name[64]);
+void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value); // NaN where there is nothing to measure
+/** what gauges keep from the start goes through checkpoints: after a resume create, then load */
+silt_status silt_gauges_save(const silt_gauges *gauges, silt_store *store, silt_error *err);
+silt_status silt_gauges_load(silt_gauges *gauges, silt_store *store, silt_error *err);
+
+// history.c ----------------------------------------------------------------------------------------
+typedef struct silt_history silt_history;
+silt_status silt_history_create(silt_history **history, const char *out, const silt_scene *scene, silt_error *err);
+/** opens an existing history.csv, cuts rows with step > last away, goes on behind it */
+silt_status silt_history_reopen(silt_history **history, const char *out, const silt_scene *scene, int64_t last, silt_error *err);
+silt_status silt_history_row(silt_history *history, const silt_view *view, const double *gauge, silt_error *err);
+/** forces the rows to the disk; before a checkpoint is committed, so that no checkpoint is ahead of its history */
+silt_status silt_history_sync(silt_history *history, silt_error *err);
+silt_status silt_history_close(silt_history **history, silt_error *err);
+
+// frame.c ------------------------------------------------------------------------------------------
+/** writes fluid_NNNNNN.hdf etc., the .series indices, run.h5 and a line of run.log */
+silt_status silt_frame_write(const char *out, int number, const silt_view *view, silt_error *err);
+/** after a resume: drops index entries of frames past `number` */
+silt_status silt_frame_cut(const char *out, int number, silt_error *err);
+typedef struct silt_frame_entry {
+    int number;
+    double time; // s
+} silt_frame_entry;
+/** the frames that OUT's indices name, in order. @return how many; *entry is owned by the caller */
+int silt_frame_index(const char *out, silt_frame_entry **entry);
+
+// summary.c ----------------------------------------------------------------------------------------
+typedef struct silt_summary {
+    const char *status;           // "done", "failed", "stopped"
+    const char *message;          // why, when not done
+    double seconds;               // wall clock of this process' run
+    double phase[PHASE_COUNT];    // s, summed
+    double node_steps;            // sum over steps of nodes
+    double worst_volume_error, worst_sediment_error, worst_momentum_error;
+    int64_t steps, retries, iterations;
+} silt_summary;
+silt_status silt_summary_write(const char *out, const silt_view *view, const silt_summary *summary, silt_error *err);
+void silt_progress(const silt_view *view, double until, double seconds, bool last); // one terminal line on stderr
+
+// verify.c, draw.c, info.c ---------------------------------------------------------------------------
+/** one check of the scene, measured */
+typedef struct silt_check_result {
+    const char *name;      // borrowed from the scene
+    double value;          // the scalar; for a curve the result where it is worst
+    double reference;      // expected there
+    double error, tolerance;
+    bool pass;
+    char note[256];        // why there is no value, or how much of the reference was covered; else empty
+} silt_check_result;
+/** Holds OUT/history.csv against the scene's checks; result has scene->n_check items. References are looked for in OUT
+ * first, then beside the scene. A check that cannot be measured fails with a note; only an unreadable history is an error. */
+silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_check_result *result, silt_error *err);
+/** Copies the files that the scene reads (references, series) into OUT and writes OUT/scene.yaml: the resolved scene,
+ * which names the copies, so that OUT can be verified, resumed and run again anywhere. */
+silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err);
+/** Holds OUT against the checks of OUT/scene.yaml; prints a line a check to `to`. SILT_FAILED when one fails. */
+silt_status silt_verify(const char *out, FILE *to, silt_error *err);
+/** PNG pictures of frames: frame -1 all, -2 the last; field: mesh, pressure, speed, porosity, bed. Written as OUT/picture_NNNNNN.png */
+silt_status silt_draw(const char *out, int frame, const char *field, const char *to, FILE *say, silt_error *err);
+silt_status silt_info(const char *path, FILE *to, silt_error *err);
+
+#endif

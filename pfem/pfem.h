@@ -1,0 +1,257 @@
+/** @file pfem.h
+ * The data model on a page, in the order of the flow: nodes -> mesh -> fluid -> bed -> coupling -> ledger -> run.
+ * Vectors are interleaved, `dim` numbers a node; in 2-D masses, volumes and forces are per metre of width.
+ * All structs are valid when zeroed. "owned": freed by the struct's own *_clear.
+ */
+#ifndef SILT_PFEM_H
+#define SILT_PFEM_H
+
+#include "scene.h"
+
+typedef struct silt_bed silt_bed;
+
+// ---------------------------------------------------------------- nodes
+
+typedef enum {
+    NODE_FLUID = 0, // a particle of water: moves with its velocity; may slide or stick on tank walls (wall[])
+    NODE_CORNER,    // fixed at a vertex of the tank's outline that points into the water
+    NODE_BED,       // on the bed's surface, fixed while the bed stands; owner: bed node
+    NODE_BODY,      // on the outline of a rigid object, moves with it; owner: body
+    NODE_INLET,     // stays on the inlet line, velocity prescribed; owner: inlet
+} silt_node_kind;
+
+typedef struct silt_nodes {
+    int count;
+    int capacity;
+    double *x;       // owned, position, m
+    double *v;       // owned, velocity, m/s
+    double *p;       // owned, pressure, Pa
+    double *debt;    // owned, m3: volume that remeshing took from the water here and that is owed to it (negative: too much)
+    int64_t *id;     // owned, never used twice
+    uint8_t *kind;   // owned, silt_node_kind
+    int *owner;      // owned, see silt_node_kind, else -1
+    int (*wall)[2];  // owned, segments of silt_walls that the node lies on, -1
+    int64_t next_id;
+} silt_nodes;
+
+// ---------------------------------------------------------------- walls (wall.c)
+
+/** the tank's straight segments, water on the left of from -> to */
+typedef struct silt_walls {
+    int count;
+    double (*from)[2], (*to)[2]; // owned, m
+    double (*normal)[2];         // owned, unit, into the water
+    uint8_t *slip;               // owned, 1: water slides along
+    double *roughness;           // owned, m, k_s of the wall law, 0 smooth, -1: no wall law
+    int *next, *previous;        // owned, segment joined at `to` / at `from`, -1
+} silt_walls;
+
+void silt_walls_create(silt_walls *walls, const silt_scene *scene);
+void silt_walls_clear(silt_walls *walls);
+/** Signed distance of a point to the nearest segment, positive on the water's side; *segment is that segment (-1: no walls,
+ * distance +inf). At a vertex the side is decided by the two segments that meet there. */
+double silt_walls_distance(const silt_walls *walls, const double *point, int *segment);
+/** Nodes that lie on walls: puts them exactly on, lets them turn corners, attaches what has come through or touches. */
+void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double *x_old, const uint8_t *interior, double h);
+
+// ---------------------------------------------------------------- nodes (node.c, seed.c)
+
+void silt_nodes_clear(silt_nodes *nodes);
+/** appends a node with zero fields; @return its index */
+int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double x[2]);
+/** Removes nodes with dead[i] != 0, keeps the order; map[i] is the new index or -1 */
+void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map);
+/** Fills the scene's regions with water nodes, inlets and tank corners; leaves out what lies in `solid` (bed, bodies). */
+typedef bool (*silt_solid_test)(const void *context, const double x[2], double margin);
+void silt_nodes_seed(silt_nodes *nodes, const silt_scene *scene, const silt_walls *walls, silt_solid_test solid,
+                     const void *context);
+/** Points along a closed outline at spacing h, corners kept. @return how many; xy malloc'ed, owned by the caller */
+int silt_outline_points(int n, const double *outline, double h, double **xy);
+
+// ---------------------------------------------------------------- mesh (mesh.c)
+
+typedef enum { EDGE_FREE = 0, EDGE_WALL, EDGE_BED, EDGE_BODY, EDGE_INLET } silt_edge_kind;
+
+typedef struct silt_mesh {
+    int64_t revision;  // rises at every rebuild; what is derived from the topology remembers it
+    int n_node;        // nodes that the arrays below were made for
+    int n_cell;
+    int cell_capacity;
+    int (*cell)[3];    // owned, nodes, counter-clockwise: the water's triangles
+    int n_edge;
+    int edge_capacity;
+    int (*edge)[2];    // owned, the water's boundary, water on the left
+    uint8_t *edge_kind; // owned, silt_edge_kind
+    uint8_t *wet;      // owned, one per node: 1 when the node has a cell
+    uint8_t *surface;  // owned, one per node: 1 when the node has a free edge
+    int *node_cell_start, *node_cell; // owned, cells of a node (start has n_node + 1)
+    int *neighbour_start, *neighbour; // owned, nodes joined to a node by an edge, itself included, rising
+    int wet_capacity, surface_capacity, start_capacity, neighbour_start_capacity, node_cell_capacity, neighbour_capacity;
+    int edge_kind_capacity;
+} silt_mesh;
+
+/** Derived data of the topology: adjacency, boundary edges, wet and surface flags. Raises the revision. */
+void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes);
+void silt_mesh_clear(silt_mesh *mesh);
+double silt_cell_area(const double *x, const int cell[3]);
+/** m3, sum of the cells */
+double silt_mesh_volume(const silt_mesh *mesh, const double *x);
+
+/** What was water before a rebuild, and what was done to the cloud since: the rebuild's memory (remesh.c). Node numbers are
+ * those of the cloud with dead nodes still in place and new ones appended. */
+typedef struct silt_memory {
+    int n_cell, cell_capacity, area_capacity;
+    int (*cell)[3];   // owned, cells that were water: the old mesh, and bed cells that became water
+    double *area;     // owned, m2, what each of them held before the cloud was edited
+    int n_taken, taken_capacity, taken_area_capacity;
+    int (*taken)[3];  // owned, bed cells that grew into the water
+    double *taken_area; // owned, m2
+    int n_node, flag_capacity, dead_capacity;
+    uint8_t *interior; // owned, one per node: had cells and no free edge
+    uint8_t *dead;     // owned, one per node: leaves the cloud at the rebuild
+    int n_added, n_removed; // by refinement, of the last step
+    double reconnected;     // m3, volume that the rebuild itself made (positive) or lost
+} silt_memory;
+void silt_memory_clear(silt_memory *memory);
+/** Takes down the present mesh with its areas at positions x (before the cloud is edited). */
+void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nodes *nodes);
+/** Makes the memory's flags as long as the cloud is now. */
+void silt_memory_extend(silt_memory *memory, int n_node);
+/** Marks crowded nodes dead and adds nodes where the mesh is stretched (refine.c). */
+void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h);
+
+/** what the water cannot enter; distance < 0 inside */
+typedef struct silt_barrier {
+    const silt_walls *walls;
+    const silt_bed *bed;             // NULL: none
+    const struct silt_body_state *bodies; // NULL: none
+} silt_barrier;
+bool silt_barrier_contains(const silt_barrier *barrier, const double point[2]);
+bool silt_bed_contains(const silt_bed *bed, const double x[2]); // bed.c
+
+/** The first mesh: cells whose centroid lies in a region of the scene. */
+silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
+                            silt_error *err);
+/** Triangulates the cloud, decides what is water, books what that did to the volume on the nodes' debt, drops dead nodes.
+ * @param map  out, new index of every node of the old numbering (n_node of the memory), or -1; owned by the caller */
+silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
+                              silt_memory *memory, int *map, silt_error *err);
+
+/** Finds points in the water. Rebuilt when mesh->revision or the positions changed (locate_build). */
+typedef struct silt_locator {
+    double lo[2], cell_size;
+    int nx, ny;
+    int *start, *item; // owned, grid cell -> mesh cells that may hold it
+    int start_capacity, item_capacity;
+} silt_locator;
+void silt_locator_build(silt_locator *locator, const silt_mesh *mesh, const double *x, double h);
+/** Cell that holds the point and its three barycentric weights, or -1 */
+int silt_locate(const silt_locator *locator, const silt_mesh *mesh, const double *x, const double *point, double weight[3]);
+void silt_locator_clear(silt_locator *locator);
+
+// ---------------------------------------------------------------- what grains do to the water in a step
+
+/** Filled by dem-coupling, read by the fluid. All arrays one (or dim) per node, owned by the coupling; NULL pointer: no grains.
+ * Momentum of node i: (M_i/dt + coefficient_i) u_i = M_i v_i/dt + push_i + ...;  continuity: see docs/method.md */
+typedef struct silt_drag {
+    const double *solid;       // 1 - porosity, nodal, P1
+    const double *coefficient; // kg/s, sum of the grains' effective drag coefficients at the node
+    const double *push;        // N, the same sum times each grain's own velocity
+    const double *source;      // m3/s, right-hand side of continuity from the grains' motion
+    /** refreshes push and source for the iterate's pressure and velocity; called in every iteration */
+    void (*update)(void *self, const double *velocity, const double *pressure, double dt);
+    void *self;
+} silt_drag;
+
+// ---------------------------------------------------------------- bed (bed.c)
+
+/** The bed: a mesh of bed material of its own. Nodes are never renumbered while they live; dead ones have alive = 0. */
+struct silt_bed {
+    int n_node, node_capacity;
+    double (*x)[2];      // owned, m
+    uint8_t *alive;      // owned, 1 while a bed cell holds the node
+    uint8_t *exposed;    // owned, 1 when the node lies on the bed's surface (an edge of one bed cell only, not on a tank wall)
+    double *work;        // owned, J/m3, frictional work since exposure (accumulator)
+    double *eroded;      // owned, kg/m2, mass per area worn off since exposure (accumulator, physics 6)
+    double *shear;       // owned, Pa, bed shear stress of the last step
+    int *fluid_node;     // owned, index of the NODE_BED in silt_nodes, -1 while not exposed
+    int n_cell, cell_capacity;
+    int (*cell)[3];      // owned, counter-clockwise
+    double *mass;        // owned, kg per m of width, solid mass of the cell
+    double *area;        // owned, m2
+    int n_edge, edge_capacity;
+    int (*edge)[2];      // owned, exposed edges, the bed on the right, the water's side on the left
+    int64_t revision;    // rises when cells change
+    double solid_mass;   // kg/m, sum of mass
+    double initial_mass; // kg/m
+    double pore_water;   // kg/m, released to the water since the start less taken up
+    struct silt_bed_index *index; // owned, cells by node and by place (bed_mesh.h); every change keeps it up to date
+};
+
+// ---------------------------------------------------------------- coupling (dem-coupling, behind this table)
+
+/** state of the discrete elements after a step, for bed, output and ledger; in 2-D z = 0 */
+typedef struct silt_grain_state {
+    int count;
+    const int64_t *id;       // all borrowed from the coupling, valid until its next call
+    const double *x, *v, *omega; // 3 per grain
+    const double *radius;
+    const double *mass;      // kg per m of width that the parcel stands for
+    const int *contacts;     // number of contacts of the last substep
+    const uint8_t *on_bed;   // 1 when one of them is with the bed
+    const double *net_force; // N per m of width, magnitude, mean of the last step (with gravity and water)
+} silt_grain_state;
+
+typedef struct silt_body_state {
+    int count;           // as in the scene
+    struct silt_body {
+        double x[3], v[3], q[4], w[3]; // centroid, velocity, orientation (w, x, y, z), angular velocity
+        double force[3], torque[3];    // of the water, N and N m per m of width, last step
+        double contact[3];             // of contacts, mean of the last step
+        double mass, inertia;          // kg and kg m2 per m of width (about z)
+        double area;                   // m2, of the outline
+        int n_point;
+        const double *outline;         // 2 per point, counter-clockwise in the body's frame about the centroid, borrowed
+    } *body; // owned by the coupling
+} silt_body_state;
+
+/** a parcel that leaves the bed */
+typedef struct silt_release {
+    double x[2];      // centre
+    double v[2];
+    double radius;    // m
+    double mass;      // kg per m of width; solid volume is mass / bed.density
+} silt_release;
+
+// ---------------------------------------------------------------- ledger, one row of history.csv
+
+typedef struct silt_ledger {
+    double fluid_volume, flying_volume, mesh_volume, fluid_mass, volume_error; // m3, kg per m width, relative
+    double kinetic_energy, potential_energy, momentum[3];                      // J/m, kg/s
+    double initial_volume;    // water at the start
+    double inflow_mass, outflow_mass;             // water, cumulative, kg
+    double pore_water_mass;                       // released less taken up, cumulative, kg
+    double bed_mass, released_mass, deposited_mass, left_mass, fed_mass;      // sediment, cumulative, kg
+    double initial_sediment;
+    int grain_count;
+    double grain_mass, sediment_error;
+    double external_work, dissipation;            // J/m, cumulative
+    // where volume went, cumulative, m3: solved (divergence left), moved (integration), reconnected (remeshing), edited (nodes added, removed)
+    double volume_solved, volume_moved, volume_reconnected, volume_edited;
+    double momentum_error; // N s/m: impulse of gravity, walls, bed, bodies and grains against the water's momentum in the step's solve, relative
+} silt_ledger;
+
+// ---------------------------------------------------------------- checkpoint (store.c): a tree of named arrays
+
+typedef struct silt_store silt_store;
+typedef enum { STORE_BYTE = 1, STORE_INT, STORE_LONG, STORE_DOUBLE } silt_store_type;
+/** writing and reading; names like "nodes/x". Reading fails (SILT_FAILED, message names file and array) when it is absent or has another count. */
+silt_status silt_store_create(silt_store **store, const char *path, silt_error *err); // written aside, renamed by commit
+silt_status silt_store_commit(silt_store **store, silt_error *err);                   // closes, renames into place
+silt_status silt_store_open(silt_store **store, const char *path, silt_error *err);
+void silt_store_close(silt_store **store); // a store that was not committed leaves no file
+silt_status silt_store_put(silt_store *store, const char *name, silt_store_type type, size_t n, const void *data, silt_error *err);
+silt_status silt_store_count(silt_store *store, const char *name, size_t *n, silt_error *err);
+silt_status silt_store_take(silt_store *store, const char *name, silt_store_type type, size_t n, void *data, silt_error *err);
+
+#endif

@@ -1,0 +1,96 @@
+/** @file run.h
+ * The mutable run: all that happens, in the order of the flow. Only run.c, move.c, sediment.c and state.c see it whole.
+ */
+#ifndef SILT_RUN_H
+#define SILT_RUN_H
+
+#include "coupling.h"
+#include "fluid.h"
+#include "output.h"
+
+/** a parcel that has left the bed but has no room yet to stand in */
+typedef struct silt_waiting {
+    double x[2], normal[2], reach; // patch centre, out of the bed, how far out to look
+    double mass;                   // kg per m
+} silt_waiting;
+
+/** how long a grain has been at rest */
+typedef struct silt_rest {
+    int64_t id;
+    double time; // s
+} silt_rest;
+
+struct silt_run {
+    const silt_scene *scene;
+    silt_run_def def;
+    char *out;        // owned
+    char *worker;     // owned
+    char *log;        // owned
+
+    silt_walls walls;
+    silt_nodes nodes;
+    silt_mesh mesh;
+    silt_memory memory;
+    silt_locator locator;
+    silt_fluid fluid;
+    silt_bed bed;
+    silt_coupling *coupling; // owned, NULL without grains and bodies
+    const silt_drag *drag;   // borrowed from the coupling, NULL: no grain in the water
+    silt_barrier barrier;
+
+    // sediment between bed and grains
+    int n_waiting, waiting_capacity;
+    silt_waiting *waiting; // owned
+    int n_rest, rest_capacity;
+    silt_rest *rest;       // owned, rising id
+    int n_freed, freed_capacity;
+    int (*freed)[3];       // owned, bed nodes of cells released in this step
+    int freed_area_capacity;
+    double *freed_area;    // owned
+    int n_grown, grown_capacity;
+    int (*grown)[3];       // owned, bed nodes of cells deposited in this step
+    int grown_area_capacity;
+    double *grown_area;    // owned
+    int64_t bed_revision;  // that nodes and coupling know
+
+    // clocks: time = frame * output + offset, with offset = tick * step of the coupling when there is one
+    int64_t step, frame, tick;
+    double offset, time, dt;
+    int64_t next_checkpoint; // frame at which the next one is due
+    int checkpoint_slot;
+
+    silt_ledger ledger;
+    silt_gauges *gauges;
+    double *gauge; // owned
+    silt_history *history;
+    silt_summary summary;
+    double phase[PHASE_COUNT]; // s, of the step
+    double started;            // wall clock
+    double output_seconds;     // that the last row and frame took
+
+    int n_body_before, body_before_capacity;
+    struct silt_body *body_before; // owned, poses at the start of the step
+    double *x_old;   // owned, 2 per node, positions at the start of the step
+    int *map;        // owned, renumbering of the last rebuild
+    int x_old_capacity, map_capacity;
+    double box_lo[2], box_hi[2]; // what lies outside has left
+};
+
+// move.c ----------------------------------------------------------------------------------------------
+/** Nodes, inlets, outlets and bodies to their new places, then the new mesh. */
+silt_status silt_run_move(silt_run *run, silt_error *err);
+/** velocity of inlets and bodies for the step that begins */
+void silt_run_prescribe(silt_run *run);
+
+// sediment.c ------------------------------------------------------------------------------------------
+void silt_run_release(silt_run *run);              // after the water's step: what the bed gives
+void silt_run_place(silt_run *run);                // parcels that wait find room
+silt_status silt_run_deposit(silt_run *run, silt_error *err); // after the grains' step: what comes to rest
+void silt_run_bed_sync(silt_run *run);             // nodes on the bed's surface follow the bed
+
+// state.c ---------------------------------------------------------------------------------------------
+silt_status silt_run_save(silt_run *run, const char *path, silt_error *err);
+silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err);
+void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def);
+
+#endif

@@ -1,0 +1,276 @@
+/** @file scene.h
+ * What was asked: the scene as plain data, constant after reading. Every field below that a user can set is one row of the
+ * table in scene_keys.c. SI units, angles in degrees as in the file. Lists are owned by the scene.
+ * Geometry is stored with three components; in 2-D the third is 0.
+ */
+#ifndef SILT_SCENE_H
+#define SILT_SCENE_H
+
+#include "base.h"
+
+/** a table over time (or over anything): a CSV beside the scene, or a constant */
+typedef struct silt_series {
+    int n_row, n_column;
+    char **name;   // owned, n_column column names of the header
+    double *value; // owned, n_row x n_column; column 0 is the abscissa; NaN: empty cells and columns of words
+    int *line;     // owned, line of each row in the file
+    char *path;    // owned, the file as it was opened
+} silt_series;
+
+typedef enum { REGION_BOX = 1, REGION_POLYGON, REGION_CIRCLE } silt_region_kind;
+/** a closed part of the plane */
+typedef struct silt_region {
+    silt_region_kind kind;
+    double lo[3], hi[3];      // box
+    int n_point;              // polygon, counter-clockwise after reading
+    double *point;            // owned, 3 per point
+    double centre[3], radius; // circle
+} silt_region;
+
+typedef enum {
+    WALL_NO_SLIP = 0,
+    WALL_SLIP,
+    WALL_LAW, // slip with the traction of the logarithmic law of the wall
+} silt_condition;
+/** a chain of straight wall segments with the water on its left */
+typedef struct silt_wall {
+    int n_point;    // at least 2; `box` is read as its closed counter-clockwise outline
+    double *point;  // owned, 3 per point
+    bool closed;
+    silt_condition condition;
+    double roughness; // m, equivalent sand roughness k_s of the wall law; 0: smooth
+} silt_wall;
+
+/** water fed in through the segment from-to (water on its left) with a velocity */
+typedef struct silt_inlet {
+    char *name;
+    double from[3], to[3];
+    double velocity[3];  // m/s; multiplied by column 1 of the series when there is one
+    silt_series series;  // n_row 0: constant; in the scene the name of a CSV file
+} silt_inlet;
+
+/** nodes and grains that cross the segment from-to from left to right leave and are counted */
+typedef struct silt_outlet {
+    char *name;
+    double from[3], to[3];
+} silt_outlet;
+
+typedef enum {
+    FORMULA_NONE = 0,
+    FORMULA_UNIFORM,        // vector
+    FORMULA_SOLID_ROTATION, // rate, centre
+    FORMULA_SHEAR,          // rate: v = (rate (y - centre_y), 0)
+    FORMULA_STRAIN,         // rate: v = (-rate x, rate y) about centre
+    FORMULA_TAYLOR_GREEN,   // amplitude, length, centre (the box's corner)
+    FORMULA_STANDING_WAVE,  // amplitude (m, of the surface), wavelength (length), depth, centre: bed at the left antinode
+} silt_formula_kind;
+typedef struct silt_formula {
+    silt_formula_kind kind;
+    double vector[3], centre[3];
+    double rate, amplitude, length, depth;
+} silt_formula;
+
+typedef enum { SCHEME_IMPLICIT = 0, SCHEME_FRACTIONAL } silt_scheme;
+typedef enum { PRESSURE_CONSISTENT = 0, PRESSURE_LAPLACIAN } silt_pressure_operator;
+
+typedef struct silt_fluid_def {
+    bool on;
+    double density;   // kg/m3, required
+    double viscosity; // Pa s, required
+    double size;      // m, node spacing h, required
+    silt_scheme scheme;             // scheme: implicit | fractional
+    silt_pressure_operator pressure; // pressure: consistent | laplacian
+    double theta;        // 0.5 to 1, implicitness of the step
+    double alpha;        // 1.3, alpha shape of what was water a step ago, times h
+    double merge;        // width of a gap between two surfaces that closes and becomes water, times h
+    double tolerance;    // relative residual of the continuity equation
+    int iterations;      // largest number of iterations per step
+    bool volume_control; // give back what remeshing created or lost, over volume_steps steps
+    double volume_steps;
+    double jitter;       // times h, random shift of the initial nodes inside the water
+    int seed;
+    int n_region;
+    silt_region *region; // owned
+    int n_inlet;
+    silt_inlet *inlet; // owned
+    int n_outlet;
+    silt_outlet *outlet; // owned
+    silt_formula velocity; // initial
+} silt_fluid_def;
+
+typedef enum { BED_FRICTIONAL_WORK = 0, BED_DISSIPATION } silt_bed_law;
+typedef struct silt_bed_def {
+    bool on;
+    double density;   // kg/m3 of the grains' solid, required
+    double porosity;  // required
+    double work;      // J/m3, W_c, required; .inf: never erodes
+    silt_bed_law law; // law: frictional-work | dissipation
+    double distance;  // m, h_k, where the law frictional-work samples the velocity; default fluid.size
+    double size;      // m, spacing of the bed's nodes; default fluid.size
+    double layer;     // m, layer thickness h_0 that one W_c removes; 0: the patch height
+    double threshold; // Pa, shear stress below which no work is done; default 0
+    double saturation; // share of the pores that holds water, default 1
+    bool deposition;   // default true
+    silt_condition condition; // of water on the bed, default no-slip
+    int n_region;
+    silt_region *region; // owned
+} silt_bed_def;
+
+typedef enum { DRAG_NONE = 0, DRAG_SCHILLER_NAUMANN, DRAG_DI_FELICE } silt_drag_law;
+/** grains present from the start: one row each, or read from a region packing later */
+typedef struct silt_grain_def {
+    double at[3], velocity[3];
+    double diameter; // m
+    double density;  // kg/m3
+} silt_grain_def;
+typedef struct silt_grains_def {
+    bool on;              // true when the block is there; bodies alone need contact properties too: see contact
+    silt_drag_law drag;   // drag: none | schiller-naumann | di-felice
+    double diameter;      // m, d50 of the bed's grains: default parcel
+    double parcel;        // m, diameter of the discrete elements that released bed becomes; required with a bed
+    double width;         // m, accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel, or 5 d without bed
+    double kernel;        // m, width of the porosity kernel; 0: max(3 d, 2 h)
+    int n_grain;
+    silt_grain_def *grain; // owned; key `list`
+} silt_grains_def;
+
+/** contact properties of grains, bodies and walls; block `contact`, required with grains, bed or bodies */
+typedef struct silt_contact_def {
+    bool on;
+    double youngs_modulus;   // Pa, 5e6 to 1e9
+    double poissons_ratio;
+    double restitution;      // 0.05 to 1
+    double friction;
+    double rolling_friction;
+    double body_friction;    // bodies against anything; default friction
+    double step;             // share of the Rayleigh time, default 0.15
+} silt_contact_def;
+
+typedef enum {
+    SHAPE_BOX = 1, // scale wide, height high
+    SHAPE_DISC,    // scale is the diameter
+    SHAPE_POLYGON, // points relative to any origin, simple polygon; scaled so that its width is `scale` if scale > 0
+    SHAPE_TEMPLE,  // columns under a roof, width `scale`; made in dem-coupling/shape.c
+} silt_shape;
+typedef enum { MOTION_FREE = 0, MOTION_FIXED } silt_motion;
+typedef struct silt_body_def {
+    char *name; // [a-z][a-z0-9_]*, unique
+    silt_shape shape;
+    double at[3];   // of the centroid, m
+    double angle;   // degrees
+    double scale;   // m, width
+    double height;  // m, box only; 0: scale
+    double density; // kg/m3
+    double velocity[3];
+    silt_motion motion;
+    int n_point;
+    double *point; // owned, polygon only, 3 per point, counter-clockwise after reading
+} silt_body_def;
+
+typedef enum {
+    GAUGE_FRONT = 1,  // front: x | -x: the foremost x of connected water
+    GAUGE_HEIGHT,     // height_at: X: top of connected water above that x
+    GAUGE_WETTED,     // wetted_at: [x, y]: 1 when water is there
+    GAUGE_PRESSURE,   // pressure_at: [x, y]
+    GAUGE_VELOCITY,   // velocity_at: [x, y]: columns NAME_x, NAME_y, NAME_z
+    GAUGE_DISCHARGE,  // discharge: [[x, y], [x, y]]: m2/s through the segment, left to right
+    GAUGE_BED_LEVEL,  // bed_level_at: X
+    GAUGE_SCOUR,      // scour_at: X: how deep the bed lies under its level at the start
+} silt_gauge_kind;
+typedef struct silt_gauge_def {
+    char *name; // column name(s) in history.csv
+    silt_gauge_kind kind;
+    double from[3], to[3]; // place; FRONT: from[0] is +1 or -1
+} silt_gauge_def;
+
+typedef enum { NORM_L2 = 1, NORM_MAX } silt_norm;
+typedef enum { SCALAR_NONE = 0, SCALAR_MAX, SCALAR_MIN, SCALAR_LAST, SCALAR_MEAN, SCALAR_PERIOD, SCALAR_SLOPE } silt_scalar;
+/** what to hold the result against: a history column against a CSV column, or a scalar of it against a value.
+ * The history's abscissa is time_scale * (time + time_shift), its ordinate scale * (column + shift). */
+typedef struct silt_check_def {
+    char *name;
+    char *column;      // key `gauge` or `column`: a column of history.csv
+    char *reference;   // file beside the scene, NULL for a scalar
+    char *x, *y;       // column names in the reference
+    char *where_column; // only reference rows with this column ...
+    double where_value; // ... equal to this; keys where: {column: , equals: }
+    double time_scale, time_shift, scale, shift; // defaults 1, 0, 1, 0
+    double align;       // NaN: none; else the curve is shifted in time so that both have this ordinate at the same abscissa
+    double window[2];   // of the abscissa after scaling; default all
+    double window_value[2]; // only where the ordinate (reference's, or the column's for a scalar) lies in here; default all
+    silt_norm norm;     // norm: l2 | max, of the difference divided by `relative_to`, or pointwise by the reference when 0
+    double relative_to; // default 0
+    silt_scalar scalar; // scalar: max | min | last | mean | period | slope
+    double value;       // expected scalar
+    double low, high;   // or the allowed range instead of value and tolerance; NaN when not given
+    double tolerance;   // relative to |value|, absolute when value is 0
+} silt_check_def;
+
+struct silt_scene {
+    char *path;     // owned, as given
+    char *folder;   // owned, where CSV files are looked for
+    char *resolved; // owned, the resolved scene as YAML text (with -D and defaults), reads back to the same scene
+    uint64_t hash;  // of resolved
+    int version;    // silt: 1
+    char *title;
+    int dimension;  // 2; 3 is refused until it exists
+    struct {
+        double end, output;    // s, required
+        double step;           // s, largest dt; 0: none
+        double cfl;            // share of a cell that a node may cross in a step
+        double checkpoint;     // s of model time between checkpoints, 0: 10 outputs
+        int64_t steps;         // most steps, 0: no limit
+        int retries;           // how often a failed step is halved
+    } time;
+    double gravity[3];
+    silt_fluid_def fluid;
+    int n_wall;
+    silt_wall *wall; // owned
+    silt_bed_def bed;
+    silt_grains_def grains;
+    silt_contact_def contact;
+    int n_body;
+    silt_body_def *body; // owned
+    int n_gauge;
+    silt_gauge_def *gauge; // owned
+    int n_check;
+    silt_check_def *check; // owned
+};
+
+/** column of the series at abscissa x: linear between rows, constant outside */
+double silt_series_at(const silt_series *series, int column, double x);
+/** Reads a CSV: '#' comments, a header with names, numbers. A column whose first cell is no number holds words: all NaN.
+ * Says nothing about the order of the rows (reference tables hold several curves): see silt_series_rising.
+ * @param base folder that a relative path starts from */
+silt_status silt_series_read(const char *base, const char *path, silt_series *series, silt_error *err);
+void silt_series_clear(silt_series *series);
+int silt_series_column(const silt_series *series, const char *name); /**< column of that name, -1: none */
+/** What silt_series_at needs: two columns or more, finite numbers, column 0 strictly rising. The error names file and line. */
+silt_status silt_series_rising(const silt_series *series, silt_error *err);
+
+/** what a scene needs */
+static inline bool silt_scene_has_dem(const silt_scene *s) { return s->grains.on || s->n_body > 0; }
+
+bool silt_region_contains(const silt_region *region, const double *x);
+double silt_region_area(const silt_region *region);
+void silt_region_bounds(const silt_region *region, double lo[2], double hi[2]);
+
+// polygons and chains, 3 numbers per point, the third unused
+double silt_polygon_area(int n, const double *point); /**< positive when counter-clockwise */
+void silt_polygon_centroid(int n, const double *point, double centre[3]);
+bool silt_polygon_contains(int n, const double *point, const double *x);
+bool silt_segments_meet(const double *a, const double *b, const double *c, const double *d); /**< touching counts */
+bool silt_chain_straight(int n, const double *point); /**< all points on one line */
+/** true when two edges meet elsewhere than at a shared corner; crossing: their indices, the smaller first */
+bool silt_chain_crosses(int n, const double *point, bool closed, int crossing[2]);
+
+/** velocity of the formula at x, m/s; g is the gravity's magnitude (standing wave) */
+void silt_formula_velocity(const silt_formula *formula, double g, const double *x, double *v);
+
+/** Prints what the table of keys says: one line per key when key is NULL, a block's keys, or all about one key
+ * ("fluid.size", "bodies.density"; a last part alone will do). Errors: SILT_INPUT, no such key, with the nearest. */
+silt_status silt_scene_help(const char *key, FILE *to, silt_error *err);
+/** Prints docs/scene.md: every key of the table in markdown. */
+void silt_scene_document(FILE *to);
+
+#endif

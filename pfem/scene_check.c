@@ -1,0 +1,630 @@
+/** @file scene_check.c
+ * What no single key can tell: names that clash, things that lie outside or in each other, blocks that need other
+ * blocks.
+ */
+#include "scene_keys.h"
+
+#include <limits.h>
+
+// blocks -----------------------------------------------------------------------------------------------
+// which blocks are there for the others
+static void check_blocks(silt_reader *reader, const silt_scene *scene) {
+    const silt_tree *root = reader->root;
+    const silt_tree *bodies = silt_tree_item(root, "bodies"), *fluid = silt_tree_item(root, "fluid");
+    const silt_tree *bed = silt_tree_item(root, "bed"), *grains = silt_tree_item(root, "grains");
+    bool has_bodies = scene->n_body > 0;
+    if (!fluid && !grains && !has_bodies && !bodies)
+        silt_complain(reader, root,
+                      "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
+                      "one of fluid, grains, bodies");
+    if (bed && !grains)
+        silt_complain_key(reader, bed,
+                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}: "
+                          "eroded bed becomes grains");
+    if (bed && scene->grains.on && !silt_tree_item(grains, "parcel"))
+        silt_complain_key(reader, grains,
+                          "key 'grains.parcel': found nothing in this block, allowed a number in m, > 0: "
+                          "the bed's parcels need a diameter");
+    else if (bed && scene->grains.on && scene->grains.parcel == 0)
+        silt_complain(reader, silt_tree_item(grains, "parcel"),
+                      "key 'grains.parcel': found 0, allowed a number in m, > 0: "
+                      "the bed's parcels need a diameter");
+    const silt_tree *first = bed ? bed : grains ? grains : has_bodies ? bodies : NULL;
+    if (first && !silt_tree_item(root, "contact"))
+        silt_complain_key(reader, first,
+                          "key '%s': found it without contact properties, allowed with a block contact "
+                          "{youngs_modulus, poissons_ratio, restitution, friction, rolling_friction}",
+                          first->key);
+    if (scene->fluid.on && !silt_tree_item(fluid, "regions") && !silt_tree_item(fluid, "inlets"))
+        silt_complain_key(reader, fluid,
+                          "key 'fluid.regions': found neither regions nor inlets, allowed at least one: "
+                          "there is no water");
+    const silt_tree *regions = silt_tree_item(bed, "regions");
+    if (regions && regions->kind == TREE_LIST && regions->n_item == 0)
+        silt_complain(reader, regions, "key 'bed.regions': found an empty list, allowed at least one region");
+}
+
+// a dimension that is there, and a number of frames that fits their names
+static void check_time(silt_reader *reader, const silt_scene *scene) {
+    const silt_tree *dimension = silt_tree_item(reader->root, "dimension");
+    if (scene->dimension == 3)
+        silt_complain(reader, dimension, "key 'dimension': found 3, allowed 2: three dimensions are not there yet");
+    if (scene->time.output > 0 && scene->time.end / scene->time.output > 999999)
+        silt_complain(reader, silt_tree_find(reader->root, "time.output"),
+                      "key 'time.output': found %.10g, which makes %.10g frames, allowed at most 999999",
+                      scene->time.output, scene->time.end / scene->time.output);
+}
+
+// walls, openings --------------------------------------------------------------------------------------
+static void check_walls(silt_reader *reader, silt_scene *scene) {
+    for (int i = 0; i < scene->n_wall; i++) {
+        silt_wall *wall = &scene->wall[i];
+        const silt_tree *node = silt_tree_find(reader->root, "walls.%d", i);
+        const silt_tree *line = silt_tree_item(node, "polyline");
+        int n = wall->n_point, crossing[2];
+        if (silt_tree_item(node, "box"))
+            wall->closed = true;
+        // the first point again at the end says closed
+        if (n > 2 && wall->point[0] == wall->point[3 * n - 3] && wall->point[1] == wall->point[3 * n - 2]) {
+            wall->n_point = --n;
+            wall->closed = true;
+        }
+        if (n == 2 && wall->closed)
+            silt_complain(reader, line, "key 'walls.%d.polyline': found a closed wall of 2 points, allowed 3 or more",
+                          i);
+        else if (n > 2 && wall->closed && silt_chain_crosses(n, wall->point, true, crossing))
+            silt_complain(reader, line,
+                          "key 'walls.%d.polyline': found the closing edge %d meeting edge %d, allowed a "
+                          "polyline that crosses or touches itself nowhere",
+                          i, crossing[1], crossing[0]);
+    }
+}
+
+static void check_opening(silt_reader *reader, const char *list, int i, const double *from, const double *to) {
+    const silt_tree *node = silt_tree_find(reader->root, "fluid.%s.%d", list, i);
+    const silt_tree *from_node = silt_tree_item(node, "from"), *to_node = silt_tree_item(node, "to");
+    if (from_node && to_node && from[0] == to[0] && from[1] == to[1])
+        silt_complain(reader, to_node,
+                      "key 'fluid.%s.%d.to': found the point [%.10g, %.10g] of `from` again, allowed another "
+                      "one",
+                      list, i, to[0], to[1]);
+}
+
+// openings have two ends and a name of their own
+static void check_openings(silt_reader *reader, const silt_scene *scene) {
+    const silt_fluid_def *fluid = &scene->fluid;
+    int n_in = fluid->n_inlet, n = n_in + fluid->n_outlet;
+    for (int i = 0; i < n_in; i++)
+        check_opening(reader, "inlets", i, fluid->inlet[i].from, fluid->inlet[i].to);
+    for (int i = 0; i < fluid->n_outlet; i++)
+        check_opening(reader, "outlets", i, fluid->outlet[i].from, fluid->outlet[i].to);
+    // few: all pairs
+    for (int i = 1; i < n && i < 1000; i++)
+        for (int k = 0; k < i; k++) {
+            const char *a = i < n_in ? fluid->inlet[i].name : fluid->outlet[i - n_in].name;
+            const char *b = k < n_in ? fluid->inlet[k].name : fluid->outlet[k - n_in].name;
+            if (!a || !b || strcmp(a, b) != 0)
+                continue;
+            const char *list = i < n_in ? "inlets" : "outlets";
+            int at = i < n_in ? i : i - n_in;
+            silt_complain(reader, silt_tree_find(reader->root, "fluid.%s.%d.name", list, at),
+                          "key 'fluid.%s.%d.name': found the name '%s' again, allowed a name of its own", list, at, a);
+            break;
+        }
+}
+
+// inside the walls -------------------------------------------------------------------------------------
+/** the box spanned by walls and water; open where things fall in from */
+typedef struct check_box {
+    double lo[2], hi[2], slack;
+    bool open_low[2], open_high[2];
+    bool known;
+} check_box;
+
+// false for a region that a complaint was already made about
+static bool check_region_whole(const silt_region *region) {
+    return (region->kind == REGION_BOX && region->lo[0] < region->hi[0]) ||
+           (region->kind == REGION_POLYGON && region->n_point > 0) ||
+           (region->kind == REGION_CIRCLE && region->radius > 0);
+}
+
+static void check_box_add(check_box *box, const double *lo, const double *hi) {
+    for (int k = 0; k < 2; k++) {
+        box->lo[k] = silt_min(box->lo[k], lo[k]);
+        box->hi[k] = silt_max(box->hi[k], hi[k]);
+    }
+    box->known = true;
+}
+
+// spanned by the walls alone, or by walls and water; what has gravity behind it may come in from above
+static check_box check_box_make(const silt_scene *scene, bool water) {
+    check_box box = {.lo = {HUGE_VAL, HUGE_VAL}, .hi = {-HUGE_VAL, -HUGE_VAL}};
+    for (int i = 0; i < scene->n_wall; i++)
+        for (int k = 0; k < scene->wall[i].n_point; k++)
+            check_box_add(&box, scene->wall[i].point + 3 * k, scene->wall[i].point + 3 * k);
+    for (int i = 0; water && i < scene->fluid.n_region; i++) {
+        double lo[2], hi[2];
+        if (!check_region_whole(&scene->fluid.region[i]))
+            continue;
+        silt_region_bounds(&scene->fluid.region[i], lo, hi);
+        check_box_add(&box, lo, hi);
+    }
+    box.slack = box.known ? 1e-9 * (box.hi[0] - box.lo[0] + box.hi[1] - box.lo[1]) : 0;
+    for (int k = 0; k < 2; k++) {
+        box.open_low[k] = scene->gravity[k] > 0;
+        box.open_high[k] = scene->gravity[k] < 0 || (k == 1 && scene->gravity[1] == 0);
+    }
+    return box;
+}
+
+static bool check_box_holds(const check_box *box, const double *lo, const double *hi, double slack) {
+    slack += box->slack;
+    for (int k = 0; k < 2; k++)
+        if ((!box->open_low[k] && lo[k] < box->lo[k] - slack) || (!box->open_high[k] && hi[k] > box->hi[k] + slack))
+            return false;
+    return true;
+}
+
+static void __attribute__((format(printf, 4, 5)))
+check_outside(silt_reader *reader, const silt_tree *node, const check_box *box, const char *format, ...) {
+    char path[128];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(path, sizeof path, format, list);
+    va_end(list);
+    silt_complain(reader, node,
+                  "key '%s': found it outside of the walls, allowed inside of the box from [%.10g, %.10g] to "
+                  "[%.10g, %.10g] that the walls and the water span",
+                  path, box->lo[0], box->lo[1], box->hi[0], box->hi[1]);
+}
+
+// water, bed and grains where the walls can hold them
+static void check_inside(silt_reader *reader, const silt_scene *scene) {
+    check_box walls = check_box_make(scene, false), box = check_box_make(scene, true);
+    double lo[2], hi[2];
+    // water is outside when it lies beside the walls altogether, or below them
+    for (int i = 0; walls.known && i < scene->fluid.n_region; i++) {
+        if (!check_region_whole(&scene->fluid.region[i]))
+            continue;
+        silt_region_bounds(&scene->fluid.region[i], lo, hi);
+        bool apart = false;
+        for (int k = 0; k < 2; k++)
+            apart |= (!walls.open_low[k] && hi[k] <= walls.lo[k] && walls.hi[k] > walls.lo[k]) ||
+                     (!walls.open_high[k] && lo[k] >= walls.hi[k] && walls.hi[k] > walls.lo[k]);
+        if (apart)
+            check_outside(reader, silt_tree_find(reader->root, "fluid.regions.%d", i), &walls, "fluid.regions.%d", i);
+    }
+    for (int i = 0; box.known && i < scene->bed.n_region; i++) {
+        if (!check_region_whole(&scene->bed.region[i]))
+            continue;
+        silt_region_bounds(&scene->bed.region[i], lo, hi);
+        if (!check_box_holds(&box, lo, hi, 0))
+            check_outside(reader, silt_tree_find(reader->root, "bed.regions.%d", i), &box, "bed.regions.%d", i);
+    }
+    for (int i = 0; box.known && i < scene->grains.n_grain; i++) {
+        const double *at = scene->grains.grain[i].at;
+        if (!check_box_holds(&box, at, at, 0))
+            check_outside(reader, silt_tree_find(reader->root, "grains.list.%d.at", i), &box, "grains.list.%d.at", i);
+    }
+}
+
+// bodies -----------------------------------------------------------------------------------------------
+/** outline in place: a polygon, or a circle when n_point is 0 */
+typedef struct check_shape {
+    int n_point;
+    double *point;            // owned
+    double centre[2], radius; // circumscribed; the circle itself
+} check_shape;
+
+// a little smaller than the body: touching is allowed
+static check_shape check_shape_make(const silt_body_def *body) {
+    const double shrink = 1 - 1e-6;
+    check_shape shape = {.centre = {body->at[0], body->at[1]}};
+    double centre[3] = {0}, scale = 1;
+    double width = body->scale, height = body->shape == SHAPE_TEMPLE ? 0.8 * width
+                                         : body->height > 0          ? body->height
+                                                                     : width;
+    const double corner[12] = {-width / 2, -height / 2, 0, width / 2,  -height / 2, 0,
+                               width / 2,  height / 2,  0, -width / 2, height / 2,  0};
+    const double *point = corner;
+    shape.n_point = 4;
+    if (body->shape == SHAPE_DISC) {
+        shape.n_point = 0;
+        shape.radius = shrink * width / 2;
+        return shape;
+    }
+    if (body->shape == SHAPE_POLYGON) {
+        point = body->point;
+        shape.n_point = body->n_point;
+        silt_polygon_centroid(shape.n_point, point, centre);
+        double lo = HUGE_VAL, hi = -HUGE_VAL;
+        for (int i = 0; i < shape.n_point; i++) {
+            lo = silt_min(lo, point[3 * i]);
+            hi = silt_max(hi, point[3 * i]);
+        }
+        scale = body->scale > 0 ? body->scale / (hi - lo) : 1;
+    }
+    shape.point = silt_alloc((size_t)shape.n_point, 3 * sizeof *shape.point);
+    double turn = body->angle * M_PI / 180, c = cos(turn) * scale * shrink, s = sin(turn) * scale * shrink;
+    for (int i = 0; i < shape.n_point; i++) {
+        double x = point[3 * i] - centre[0], y = point[3 * i + 1] - centre[1];
+        shape.point[3 * i] = body->at[0] + c * x - s * y;
+        shape.point[3 * i + 1] = body->at[1] + s * x + c * y;
+        shape.radius = silt_max(shape.radius, hypot(c * x - s * y, s * x + c * y));
+    }
+    return shape;
+}
+
+// from x to the segment a b
+static double check_distance(const double *a, const double *b, const double *x) {
+    double ux = b[0] - a[0], uy = b[1] - a[1], length = ux * ux + uy * uy;
+    double share = length > 0 ? silt_clamp(((x[0] - a[0]) * ux + (x[1] - a[1]) * uy) / length, 0, 1) : 0;
+    return hypot(a[0] + share * ux - x[0], a[1] + share * uy - x[1]);
+}
+
+// circles first, they are cheap
+static bool check_shapes_overlap(const check_shape *a, const check_shape *b) {
+    if (hypot(a->centre[0] - b->centre[0], a->centre[1] - b->centre[1]) >= a->radius + b->radius)
+        return false;
+    if (a->n_point == 0 && b->n_point == 0)
+        return true;
+    if (a->n_point == 0) {
+        const check_shape *other = a;
+        a = b;
+        b = other;
+    }
+    // a is a polygon now; b lies in it, crosses it, or holds it
+    if (b->n_point == 0) {
+        bool near = silt_polygon_contains(a->n_point, a->point, b->centre);
+        for (int i = 0; i < a->n_point && !near; i++)
+            near = check_distance(a->point + 3 * i, a->point + 3 * ((i + 1) % a->n_point), b->centre) < b->radius;
+        return near;
+    }
+    for (int i = 0; i < a->n_point; i++)
+        for (int k = 0; k < b->n_point; k++)
+            if (silt_segments_meet(a->point + 3 * i, a->point + 3 * ((i + 1) % a->n_point), b->point + 3 * k,
+                                   b->point + 3 * ((k + 1) % b->n_point)))
+                return true;
+    return silt_polygon_contains(a->n_point, a->point, b->point) ||
+           silt_polygon_contains(b->n_point, b->point, a->point);
+}
+
+// box around the outline
+static void check_shape_bounds(const check_shape *shape, double lo[2], double hi[2]) {
+    for (int k = 0; k < 2; k++) {
+        lo[k] = shape->n_point ? HUGE_VAL : shape->centre[k] - shape->radius;
+        hi[k] = shape->n_point ? -HUGE_VAL : shape->centre[k] + shape->radius;
+        for (int i = 0; i < shape->n_point; i++) {
+            lo[k] = silt_min(lo[k], shape->point[3 * i + k]);
+            hi[k] = silt_max(hi[k], shape->point[3 * i + k]);
+        }
+    }
+}
+
+// the reader let capitals through, for gauges
+static bool check_body_name(const char *name) {
+    for (const char *c = name; *c; c++)
+        if (*c >= 'A' && *c <= 'Z')
+            return false;
+    return true;
+}
+
+typedef struct check_span {
+    double left;
+    int index;
+} check_span;
+
+static int check_span_order(const void *a, const void *b) {
+    const check_span *p = a, *q = b;
+    return p->left != q->left ? (p->left < q->left ? -1 : 1) : p->index - q->index;
+}
+
+// names, sizes, places; then pairs that overlap
+static void check_bodies(silt_reader *reader, const silt_scene *scene) {
+    int n = scene->n_body, n_span = 0;
+    check_box box = check_box_make(scene, true);
+    check_shape *shape = silt_alloc((size_t)n, sizeof *shape);
+    check_span *span = silt_alloc((size_t)n, sizeof *span);
+    for (int i = 0; i < n; i++) {
+        const silt_body_def *body = &scene->body[i];
+        const silt_tree *node = silt_tree_find(reader->root, "bodies.%d", i);
+        if (body->name && !check_body_name(body->name))
+            silt_complain(reader, silt_tree_item(node, "name"),
+                          "key 'bodies.%d.name': found '%s', allowed a name of small "
+                          "letters, digits and underscores that begins with a letter",
+                          i, body->name);
+        bool sized = body->scale > 0 || (body->shape == SHAPE_POLYGON && body->n_point);
+        if (body->shape && body->shape != SHAPE_POLYGON && body->scale == 0) {
+            const silt_tree *scale = silt_tree_item(node, "scale");
+            silt_complain(reader, scale ? scale : node, "key 'bodies.%d.scale': found %s, allowed a number in m, > 0",
+                          i, scale ? "no usable width" : "nothing in this block");
+        }
+        // only bodies that are whole so far have a place
+        if (!body->shape || !sized || !silt_tree_item(node, "at") || (body->shape == SHAPE_POLYGON && !body->n_point))
+            continue;
+        shape[i] = check_shape_make(body);
+        double lo[2], hi[2];
+        check_shape_bounds(&shape[i], lo, hi);
+        if (box.known && !check_box_holds(&box, lo, hi, 1e-3 * shape[i].radius))
+            check_outside(reader, silt_tree_item(node, "at"), &box, "bodies.%d.at", i);
+        span[n_span++] = (check_span){shape[i].centre[0] - shape[i].radius, i};
+    }
+    // overlapping pairs, found along x
+    qsort(span, (size_t)n_span, sizeof *span, check_span_order);
+    for (int p = 0; p < n_span; p++) {
+        const check_shape *a = &shape[span[p].index];
+        for (int q = p + 1; q < n_span && span[q].left < a->centre[0] + a->radius; q++) {
+            if (reader->n_complaint > SCENE_COMPLAINTS || !check_shapes_overlap(a, &shape[span[q].index]))
+                continue;
+            int late = span[p].index > span[q].index ? span[p].index : span[q].index;
+            int early = span[p].index + span[q].index - late;
+            silt_complain(
+                reader, silt_tree_find(reader->root, "bodies.%d.at", late),
+                "key 'bodies.%d.at': found the body overlapping body '%s', allowed bodies apart from each other", late,
+                scene->body[early].name ? scene->body[early].name : "?");
+        }
+    }
+    for (int i = 0; i < n; i++)
+        free(shape[i].point);
+    free(shape);
+    free(span);
+}
+
+// columns of history.csv -------------------------------------------------------------------------------
+typedef struct check_column {
+    char name[64];
+    int owner; // -1: always there; i: body i; n_body + i: gauge i
+} check_column;
+
+// the same as in history.c; a test holds them together
+static const char *const check_fixed[] = {"step",
+                                          "time",
+                                          "dt",
+                                          "n_node",
+                                          "n_cell",
+                                          "fluid_volume",
+                                          "flying_volume",
+                                          "mesh_volume",
+                                          "fluid_mass",
+                                          "volume_error",
+                                          "kinetic_energy",
+                                          "potential_energy",
+                                          "momentum_x",
+                                          "momentum_y",
+                                          "momentum_z",
+                                          "momentum_error",
+                                          "external_work",
+                                          "dissipation",
+                                          "volume_solved",
+                                          "volume_moved",
+                                          "volume_reconnected",
+                                          "volume_edited",
+                                          "bed_mass",
+                                          "released_mass",
+                                          "deposited_mass",
+                                          "pore_water_mass",
+                                          "grain_count",
+                                          "grain_mass",
+                                          "sediment_error",
+                                          "left_mass",
+                                          "inflow_mass",
+                                          "outflow_mass",
+                                          "wall_mesh",
+                                          "wall_assemble",
+                                          "wall_solve",
+                                          "wall_bed",
+                                          "wall_dem",
+                                          "wall_move",
+                                          "wall_output"};
+static const char *const check_of_body[] = {"x",  "y",  "z",  "vx", "vy", "vz", "qw", "qx", "qy", "qz", "wx",
+                                            "wy", "wz", "fx", "fy", "fz", "tx", "ty", "tz", "cx", "cy", "cz"};
+enum {
+    CHECK_FIXED = sizeof check_fixed / sizeof *check_fixed,
+    CHECK_OF_BODY = sizeof check_of_body / sizeof *check_of_body,
+};
+
+static int check_column_order(const void *a, const void *b) {
+    const check_column *p = a, *q = b;
+    int by = strcmp(p->name, q->name);
+    return by ? by : p->owner - q->owner;
+}
+
+// all columns of this scene's history, sorted by name; owned by the caller
+static check_column *check_columns(const silt_scene *scene, int *count) {
+    int capacity = 0, n = 0;
+    check_column *column = NULL;
+    for (int i = 0; i < CHECK_FIXED; i++) {
+        SILT_RESERVE(column, capacity, n + 1);
+        column[n].owner = -1;
+        snprintf(column[n++].name, sizeof column->name, "%s", check_fixed[i]);
+    }
+    for (int i = 0; i < scene->n_body; i++)
+        for (int k = 0; k < CHECK_OF_BODY && scene->body[i].name; k++) {
+            SILT_RESERVE(column, capacity, n + 1);
+            column[n].owner = i;
+            snprintf(column[n++].name, sizeof column->name, "%.40s_%s", scene->body[i].name, check_of_body[k]);
+        }
+    for (int i = 0; i < scene->n_gauge; i++)
+        for (int k = 0; k < (scene->gauge[i].kind == GAUGE_VELOCITY ? 3 : 1) && scene->gauge[i].name; k++) {
+            SILT_RESERVE(column, capacity, n + 1);
+            column[n].owner = scene->n_body + i;
+            const char *ending = scene->gauge[i].kind == GAUGE_VELOCITY ? check_of_body[k] : NULL;
+            snprintf(column[n++].name, sizeof column->name, "%.40s%s%s", scene->gauge[i].name, ending ? "_" : "",
+                     ending ? ending : "");
+        }
+    qsort(column, (size_t)n, sizeof *column, check_column_order);
+    *count = n;
+    return column;
+}
+
+// neighbours of the same name: the later one is told
+static void check_names(silt_reader *reader, const silt_scene *scene, const check_column *column, int n) {
+    int last = INT_MIN; // one complaint per owner is enough
+    for (int i = 1; i < n; i++) {
+        if (strcmp(column[i].name, column[i - 1].name) != 0 || column[i].owner < 0 || column[i].owner == last)
+            continue;
+        last = column[i].owner;
+        int before = column[i - 1].owner;
+        bool body = last < scene->n_body, other_body = before < scene->n_body;
+        int at = body ? last : last - scene->n_body;
+        const char *list = body ? "bodies" : "gauges";
+        const char *name = body ? scene->body[at].name : scene->gauge[at].name;
+        const silt_tree *node = silt_tree_find(reader->root, "%s.%d.name", list, at);
+        if (before >= 0 && body == other_body)
+            silt_complain(reader, node, "key '%s.%d.name': found the name '%s' again, allowed a name of its own", list,
+                          at, name);
+        else
+            silt_complain(reader, node,
+                          "key '%s.%d.name': found '%s', which gives the column '%s' that history.csv already "
+                          "has%s%s, allowed another name",
+                          list, at, name, column[i].name, before < 0 ? "" : " from body ",
+                          before < 0 ? "" : scene->body[before].name);
+    }
+}
+
+// checks -----------------------------------------------------------------------------------------------
+static const char *check_nearest_column(const check_column *column, int n, const char *name) {
+    const char *nearest = NULL;
+    int best = 3;
+    for (int i = 0; i < n; i++) {
+        int distance = silt_text_distance(name, column[i].name, best - 1);
+        if (distance < best) {
+            best = distance;
+            nearest = column[i].name;
+        }
+    }
+    return nearest;
+}
+
+// by bisection
+static bool check_has_column(const check_column *column, int n, const char *name) {
+    check_column wanted;
+    snprintf(wanted.name, sizeof wanted.name, "%s", name);
+    int low = 0, high = n;
+    while (low < high) {
+        int middle = low + (high - low) / 2;
+        if (strcmp(column[middle].name, wanted.name) < 0)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < n && strcmp(column[low].name, name) == 0;
+}
+
+// the column that a check looks at
+static void check_target(silt_reader *reader, const silt_scene *scene, int i, const check_column *column, int n) {
+    const silt_check_def *check = &scene->check[i];
+    const silt_tree *node = silt_tree_find(reader->root, "checks.%d", i);
+    const silt_tree *gauge = silt_tree_item(node, "gauge"), *name = gauge ? gauge : silt_tree_item(node, "column");
+    if (!check->column || !name || name->kind != TREE_SCALAR)
+        return;
+    if (gauge) {
+        for (int k = 0; k < scene->n_gauge; k++)
+            if (scene->gauge[k].name && strcmp(scene->gauge[k].name, check->column) == 0) {
+                if (scene->gauge[k].kind == GAUGE_VELOCITY)
+                    silt_complain(reader, gauge,
+                                  "key 'checks.%d.gauge': found '%s', which has three columns, allowed column: "
+                                  "%s_x, %s_y or %s_z",
+                                  i, gauge->text, gauge->text, gauge->text, gauge->text);
+                return;
+            }
+    } else if (check_has_column(column, n, check->column)) {
+        return;
+    }
+    const char *nearest = check_nearest_column(column, n, check->column);
+    silt_complain(reader, name, "key 'checks.%d.%s': found '%.80s', allowed a %s%s%s%s", i, name->key, name->text,
+                  gauge ? "gauge of this scene" : "column of history.csv", nearest ? "; did you mean '" : "",
+                  nearest ? nearest : "", nearest ? "'?" : "");
+}
+
+// a column of the reference by the key's text; missing x and y are its first two
+static void check_reference_column(silt_reader *reader, int i, const silt_tree *node, const char *path,
+                                   const silt_series *table, char **name, int fallback) {
+    if (!*name && fallback >= 0 && fallback < table->n_column)
+        *name = silt_text("%s", table->name[fallback]);
+    if (*name && silt_series_column(table, *name) >= 0)
+        return;
+    const silt_tree *at = silt_tree_find(node, "%s", path);
+    char *text = NULL;
+    size_t size = 0;
+    FILE *to = open_memstream(&text, &size);
+    if (!to)
+        return;
+    for (int k = 0; k < table->n_column && k < 20; k++)
+        fprintf(to, "%s%.40s", k ? ", " : "", table->name[k]);
+    fclose(to);
+    silt_complain(reader, at ? at : node, "key 'checks.%d.%s': found %s%.80s%s, allowed a column of %s: %s", i, path,
+                  *name ? "'" : "", *name ? *name : "nothing", *name ? "'" : "", table->path, text);
+    free(text);
+}
+
+// the file, and the columns wanted of it
+static void check_reference(silt_reader *reader, silt_check_def *check, int i, const silt_tree *node) {
+    silt_error err = {0};
+    silt_series table = {0};
+    if (silt_series_read(NULL, check->reference, &table, &err) != SILT_OK) {
+        silt_complain(reader, silt_tree_item(node, "reference"),
+                      "key 'checks.%d.reference': found a file that cannot serve, allowed a CSV table: %s", i,
+                      err.text);
+        return;
+    }
+    check_reference_column(reader, i, node, "x", &table, &check->x, 0);
+    check_reference_column(reader, i, node, "y", &table, &check->y, 1);
+    if (check->where_column)
+        check_reference_column(reader, i, node, "where.column", &table, &check->where_column, -1);
+    silt_series_clear(&table);
+}
+
+// each check has one target, one thing to hold it against, and a tolerance
+static void check_checks(silt_reader *reader, silt_scene *scene, const check_column *column, int n) {
+    for (int i = 0; i < scene->n_check; i++) {
+        silt_check_def *check = &scene->check[i];
+        const silt_tree *node = silt_tree_find(reader->root, "checks.%d", i);
+        if (!node || node->kind != TREE_MAPPING)
+            continue;
+        check_target(reader, scene, i, column, n);
+        const silt_tree *reference = silt_tree_item(node, "reference"), *scalar = silt_tree_item(node, "scalar");
+        const silt_tree *value = silt_tree_item(node, "value"), *range = silt_tree_item(node, "range");
+        bool is_scalar = check->scalar != SCALAR_NONE;
+        if (!reference && (!scalar || strcmp(scalar->text ? scalar->text : "", "none") == 0))
+            silt_complain(reader, node, "key 'checks.%d': found neither a reference nor a scalar, allowed one of them",
+                          i);
+        else if (reference && is_scalar)
+            silt_complain_key(reader, scalar,
+                              "key 'checks.%d.scalar': found it beside a reference, allowed only one of them", i);
+        else if (is_scalar && !value && !range)
+            silt_complain(reader, node,
+                          "key 'checks.%d.value': found nothing to hold the scalar against, allowed value with "
+                          "tolerance, or range",
+                          i);
+        else if (is_scalar && value && range)
+            silt_complain_key(reader, range, "key 'checks.%d.range': found it beside a value, allowed only one of them",
+                              i);
+        else if (!(is_scalar && range) && !silt_tree_item(node, "tolerance"))
+            silt_complain(reader, node,
+                          "key 'checks.%d.tolerance': found nothing in this block, allowed a number, >= 0", i);
+        if (check->reference)
+            check_reference(reader, check, i, node);
+        for (int k = 0; k < i && i < 1000; k++)
+            if (check->name && scene->check[k].name && strcmp(check->name, scene->check[k].name) == 0) {
+                silt_complain(reader, silt_tree_item(node, "name"),
+                              "key 'checks.%d.name': found the name '%s' again, allowed a name of its own", i,
+                              check->name);
+                break;
+            }
+    }
+}
+
+void silt_scene_check(silt_reader *reader, silt_scene *scene) {
+    check_blocks(reader, scene);
+    check_time(reader, scene);
+    check_walls(reader, scene);
+    check_openings(reader, scene);
+    check_inside(reader, scene);
+    check_bodies(reader, scene);
+    int n;
+    check_column *column = check_columns(scene, &n);
+    check_names(reader, scene, column, n);
+    check_checks(reader, scene, column, n);
+    free(column);
+}

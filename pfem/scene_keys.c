@@ -1,0 +1,331 @@
+/** @file scene_keys.c
+ * The table of all scene keys, one row a key. The parser, its messages, the resolved scene, help and docs/scene.md
+ * follow it.
+ */
+#include "scene_keys.h"
+
+#define AT(type, field)           .offset = offsetof(type, field)
+#define MANY(type, number, field) .count = offsetof(type, number), .offset = offsetof(type, field)
+#define RANGE(from, to)           .low = from, .high = to
+#define POSITIVE                  .flags = KEY_OPEN_LOW, .low = 0, .high = HUGE_VAL
+#define NOT_NEGATIVE              .low = 0, .high = HUGE_VAL
+#define ONLY(kind)                (1u << (kind))
+#define TABLE(name_, what_, type, selector_)                                                                           \
+    static const silt_key_table name_##_table = {what_, sizeof(type), name_##_rows, selector_}
+
+static const silt_word scheme_words[] = {{"implicit", SCHEME_IMPLICIT}, {"fractional", SCHEME_FRACTIONAL}, {0}};
+static const silt_word pressure_words[] = {{"consistent", PRESSURE_CONSISTENT}, {"laplacian", PRESSURE_LAPLACIAN}, {0}};
+static const silt_word condition_words[] = {
+    {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
+static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, {"dissipation", BED_DISSIPATION}, {0}};
+static const silt_word drag_words[] = {
+    {"none", DRAG_NONE}, {"schiller-naumann", DRAG_SCHILLER_NAUMANN}, {"di-felice", DRAG_DI_FELICE}, {0}};
+static const silt_word shape_words[] = {
+    {"box", SHAPE_BOX}, {"disc", SHAPE_DISC}, {"polygon", SHAPE_POLYGON}, {"temple", SHAPE_TEMPLE}, {0}};
+static const silt_word motion_words[] = {{"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {0}};
+static const silt_word front_words[] = {{"x", 1}, {"-x", -1}, {0}};
+static const silt_word norm_words[] = {{"l2", NORM_L2}, {"max", NORM_MAX}, {0}};
+static const silt_word scalar_words[] = {
+    {"none", SCALAR_NONE}, {"max", SCALAR_MAX},       {"min", SCALAR_MIN},     {"last", SCALAR_LAST},
+    {"mean", SCALAR_MEAN}, {"period", SCALAR_PERIOD}, {"slope", SCALAR_SLOPE}, {0}};
+static const silt_word formula_words[] = {{"uniform", FORMULA_UNIFORM},
+                                          {"solid-rotation", FORMULA_SOLID_ROTATION},
+                                          {"shear", FORMULA_SHEAR},
+                                          {"strain", FORMULA_STRAIN},
+                                          {"taylor-green", FORMULA_TAYLOR_GREEN},
+                                          {"standing-wave", FORMULA_STANDING_WAVE},
+                                          {0}};
+
+static const silt_key time_rows[] = {
+    {"end", KEY_NUMBER, .unit = "s", POSITIVE, AT(silt_scene, time.end), .doc = "simulated time"},
+    {"output", KEY_NUMBER, .unit = "s", POSITIVE, AT(silt_scene, time.output), .doc = "time between frames"},
+    {"step", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_scene, time.step),
+     .doc = "largest step; 0: no limit of its own"},
+    {"cfl", KEY_NUMBER, .fallback = "0.5", .flags = KEY_OPEN_LOW, RANGE(0, 1), AT(silt_scene, time.cfl),
+     .doc = "share of a cell that a node may cross in a step"},
+    {"checkpoint", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_scene, time.checkpoint),
+     .doc = "time between checkpoints; 0: ten outputs"},
+    {"steps", KEY_LONG, .fallback = "0", RANGE(0, 1e15), AT(silt_scene, time.steps), .doc = "most steps; 0: no limit"},
+    {"retries", KEY_INTEGER, .fallback = "8", RANGE(0, 30), AT(silt_scene, time.retries),
+     .doc = "how often a failed step is halved"},
+    {0}};
+TABLE(time, "the time block", silt_scene, -1);
+
+static const silt_key region_rows[] = {{"box", KEY_BOX, .unit = "m", .flags = KEY_CHOICE, .select = REGION_BOX,
+                                        AT(silt_region, lo), .doc = "two opposite corners, the lower left one first"},
+                                       {"polygon", KEY_POLYGON, .unit = "m", .flags = KEY_CHOICE,
+                                        .select = REGION_POLYGON, MANY(silt_region, n_point, point),
+                                        .doc = "corners in either sense; it closes by itself"},
+                                       {"circle", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = REGION_CIRCLE,
+                                        AT(silt_region, centre), .doc = "centre of a circle"},
+                                       {"radius", KEY_NUMBER, .unit = "m", POSITIVE, .when = ONLY(REGION_CIRCLE),
+                                        AT(silt_region, radius), .doc = "of the circle"},
+                                       {0}};
+TABLE(region, "a region", silt_region, offsetof(silt_region, kind));
+
+static const silt_key inlet_rows[] = {
+    {"name", KEY_NAME, AT(silt_inlet, name), .doc = "different from all other inlets and outlets"},
+    {"from", KEY_POINT, .unit = "m", AT(silt_inlet, from), .doc = "start of the segment, the water on its left"},
+    {"to", KEY_POINT, .unit = "m", AT(silt_inlet, to), .doc = "end of the segment"},
+    {"velocity", KEY_POINT, .unit = "m/s", AT(silt_inlet, velocity), .doc = "of the water that comes in"},
+    {"series", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_inlet, series),
+     .doc = "CSV file beside the scene: time in s, factor on the velocity"},
+    {0}};
+TABLE(inlet, "an inlet", silt_inlet, -1);
+
+static const silt_key outlet_rows[] = {
+    {"name", KEY_NAME, AT(silt_outlet, name), .doc = "different from all other inlets and outlets"},
+    {"from", KEY_POINT, .unit = "m", AT(silt_outlet, from), .doc = "start of the segment"},
+    {"to", KEY_POINT, .unit = "m", AT(silt_outlet, to),
+     .doc = "end of the segment; what crosses it from its left to its right leaves"},
+    {0}};
+TABLE(outlet, "an outlet", silt_outlet, -1);
+
+enum {
+    FORMULA_WITH_RATE = ONLY(FORMULA_SOLID_ROTATION) | ONLY(FORMULA_SHEAR) | ONLY(FORMULA_STRAIN),
+    FORMULA_WITH_LENGTH = ONLY(FORMULA_TAYLOR_GREEN) | ONLY(FORMULA_STANDING_WAVE),
+};
+static const silt_key formula_rows[] = {
+    {"formula", KEY_WORD, .flags = KEY_SELECTOR, .words = formula_words, AT(silt_formula, kind),
+     .doc = "named velocity field at the start"},
+    {"vector", KEY_POINT, .unit = "m/s", .when = ONLY(FORMULA_UNIFORM), AT(silt_formula, vector),
+     .doc = "the velocity"},
+    {"rate", KEY_NUMBER, .unit = "1/s", .when = FORMULA_WITH_RATE, AT(silt_formula, rate),
+     .doc = "angular velocity, shear u = rate y, or strain u = -rate x, v = rate y, about the centre"},
+    {"amplitude", KEY_NUMBER, .unit = "m/s or m", .when = FORMULA_WITH_LENGTH, AT(silt_formula, amplitude),
+     .doc = "largest velocity of the Taylor-Green cell, height of the standing wave"},
+    {"length", KEY_NUMBER, .unit = "m", POSITIVE, .when = FORMULA_WITH_LENGTH, AT(silt_formula, length),
+     .doc = "width of the Taylor-Green cell, wavelength of the standing wave"},
+    {"depth", KEY_NUMBER, .unit = "m", POSITIVE, .when = ONLY(FORMULA_STANDING_WAVE), AT(silt_formula, depth),
+     .doc = "of the water under the standing wave"},
+    {"centre", KEY_POINT, .unit = "m", .fallback = "[0, 0]", .when = FORMULA_WITH_RATE | FORMULA_WITH_LENGTH,
+     AT(silt_formula, centre), .doc = "centre; corner of the Taylor-Green cell; bed below the first crest of the wave"},
+    {0}};
+TABLE(formula, "an initial velocity", silt_formula, offsetof(silt_formula, kind));
+
+static const silt_key fluid_rows[] = {
+    {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_fluid_def, density), .doc = "of the water"},
+    {"viscosity", KEY_NUMBER, .unit = "Pa s", NOT_NEGATIVE, AT(silt_fluid_def, viscosity), .doc = "dynamic"},
+    {"size", KEY_NUMBER, .unit = "m", POSITIVE, AT(silt_fluid_def, size), .doc = "distance h between nodes"},
+    {"scheme", KEY_WORD, .fallback = "implicit", .words = scheme_words, AT(silt_fluid_def, scheme),
+     .doc = "momentum step: viscosity implicit, or fractional step"},
+    {"pressure", KEY_WORD, .fallback = "consistent", .words = pressure_words, AT(silt_fluid_def, pressure),
+     .doc = "operator of the pressure step"},
+    {"theta", KEY_NUMBER, .fallback = "0.55", RANGE(0.5, 1), AT(silt_fluid_def, theta),
+     .doc = "implicitness of the step: 0.5 trapezoidal, 1 backward Euler"},
+    {"alpha", KEY_NUMBER, .unit = "h", .fallback = "1.3", .flags = KEY_OPEN_LOW, RANGE(0, 10),
+     AT(silt_fluid_def, alpha), .doc = "largest circumradius of a cell that was water a step ago"},
+    {"merge", KEY_NUMBER, .unit = "h", .fallback = "0.25", .flags = KEY_OPEN_LOW, RANGE(0, 10),
+     AT(silt_fluid_def, merge), .doc = "width of a gap between two surfaces that closes and becomes water"},
+    {"tolerance", KEY_NUMBER, .fallback = "1e-6", .flags = KEY_OPEN_LOW | KEY_OPEN_HIGH, RANGE(0, 1),
+     AT(silt_fluid_def, tolerance), .doc = "relative residual of the continuity equation"},
+    {"iterations", KEY_INTEGER, .fallback = "12", RANGE(1, 10000), AT(silt_fluid_def, iterations),
+     .doc = "most iterations of a step"},
+    {"volume_control", KEY_SWITCH, .fallback = "true", AT(silt_fluid_def, volume_control),
+     .doc = "give back the volume that reconnecting created or lost"},
+    {"volume_steps", KEY_NUMBER, .unit = "steps", .fallback = "15", RANGE(1, 1e6), AT(silt_fluid_def, volume_steps),
+     .doc = "over how many steps it is given back"},
+    {"jitter", KEY_NUMBER, .unit = "h", .fallback = "0", RANGE(0, 0.5), AT(silt_fluid_def, jitter),
+     .doc = "random shift of the first nodes inside the water"},
+    {"seed", KEY_INTEGER, .fallback = "1", RANGE(0, INT32_MAX), AT(silt_fluid_def, seed), .doc = "of that shift"},
+    {"regions", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &region_table, MANY(silt_fluid_def, n_region, region),
+     .doc = "where water is at the start"},
+    {"inlets", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &inlet_table, MANY(silt_fluid_def, n_inlet, inlet),
+     .doc = "where water comes in"},
+    {"outlets", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &outlet_table, MANY(silt_fluid_def, n_outlet, outlet),
+     .doc = "where water and grains leave"},
+    {"velocity", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &formula_table, .presence = PRESENT_WORD,
+     .present = offsetof(silt_fluid_def, velocity.kind), AT(silt_fluid_def, velocity),
+     .doc = "velocity at the start; at rest without it"},
+    {0}};
+TABLE(fluid, "the fluid block", silt_fluid_def, -1);
+
+static const silt_key wall_rows[] = {
+    {"polyline", KEY_CHAIN, .unit = "m", .flags = KEY_CHOICE, MANY(silt_wall, n_point, point),
+     .doc = "corners, the water on the left; a last point equal to the first closes it"},
+    {"box", KEY_OUTLINE, .unit = "m", .flags = KEY_CHOICE | KEY_SHORTHAND, MANY(silt_wall, n_point, point),
+     .doc = "closed box around the water, lower left corner first"},
+    {"closed", KEY_SWITCH, .fallback = "false", AT(silt_wall, closed), .doc = "the last point is joined to the first"},
+    {"condition", KEY_WORD, .fallback = "no-slip", .words = condition_words, AT(silt_wall, condition),
+     .doc = "of the water at the wall"},
+    {"roughness", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_wall, roughness),
+     .doc = "equivalent sand roughness of the wall law; 0: smooth"},
+    {0}};
+TABLE(wall, "a wall", silt_wall, -1);
+
+static const silt_key bed_rows[] = {
+    {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_bed_def, density), .doc = "of the grains' solid"},
+    {"porosity", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_bed_def, porosity), .doc = "share of pores"},
+    {"work", KEY_NUMBER, .unit = "J/m3", .flags = KEY_OPEN_LOW | KEY_INFINITE, RANGE(0, HUGE_VAL),
+     AT(silt_bed_def, work), .doc = "frictional work that loosens the bed; .inf: never"},
+    {"law", KEY_WORD, .fallback = "frictional-work", .words = law_words, AT(silt_bed_def, law),
+     .doc = "how the water's work on the bed is found"},
+    {"distance", KEY_NUMBER, .unit = "m", .fallback = "=fluid.size", POSITIVE, AT(silt_bed_def, distance),
+     .doc = "where the law frictional-work samples the velocity, along the normal"},
+    {"size", KEY_NUMBER, .unit = "m", .fallback = "=fluid.size", POSITIVE, AT(silt_bed_def, size),
+     .doc = "distance between the bed's nodes"},
+    {"layer", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, layer),
+     .doc = "thickness that one `work` removes; 0: the height of the patch"},
+    {"threshold", KEY_NUMBER, .unit = "Pa", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, threshold),
+     .doc = "shear stress below which no work is done"},
+    {"saturation", KEY_NUMBER, .fallback = "1", RANGE(0, 1), AT(silt_bed_def, saturation),
+     .doc = "share of the pores that holds water"},
+    {"deposition", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, deposition),
+     .doc = "resting grains become bed again"},
+    {"condition", KEY_WORD, .fallback = "no-slip", .words = condition_words, AT(silt_bed_def, condition),
+     .doc = "of the water on the bed"},
+    {"regions", KEY_LIST, .sub = &region_table, MANY(silt_bed_def, n_region, region),
+     .doc = "where bed is at the start"},
+    {0}};
+TABLE(bed, "the bed block", silt_bed_def, -1);
+
+static const silt_key grain_rows[] = {
+    {"at", KEY_POINT, .unit = "m", AT(silt_grain_def, at), .doc = "centre"},
+    {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_grain_def, velocity), .doc = "at the start"},
+    {"diameter", KEY_NUMBER, .unit = "m", POSITIVE, AT(silt_grain_def, diameter), .doc = "of this grain"},
+    {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_grain_def, density), .doc = "of its solid"},
+    {0}};
+TABLE(grain, "a grain", silt_grain_def, -1);
+
+static const silt_key grains_rows[] = {
+    {"drag", KEY_WORD, .fallback = "di-felice", .words = drag_words, AT(silt_grains_def, drag), .doc = "drag law"},
+    {"parcel", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, parcel),
+     .doc = "diameter of the elements that released bed becomes; needed with a bed"},
+    {"diameter", KEY_NUMBER, .unit = "m", .fallback = "=grains.parcel", NOT_NEGATIVE, AT(silt_grains_def, diameter),
+     .doc = "of the grains that a parcel stands for, for the drag"},
+    {"width", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, width),
+     .doc = "accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel, 5 d without a bed"},
+    {"kernel", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, kernel),
+     .doc = "width of the porosity kernel; 0: the larger of 3 d and 2 h"},
+    {"list", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &grain_table, MANY(silt_grains_def, n_grain, grain),
+     .doc = "grains that are there from the start"},
+    {0}};
+TABLE(grains, "the grains block", silt_grains_def, -1);
+
+static const silt_key contact_rows[] = {
+    {"youngs_modulus", KEY_NUMBER, .unit = "Pa", RANGE(5e6, 1e9), AT(silt_contact_def, youngs_modulus),
+     .doc = "of grains and bodies; soft is fast"},
+    {"poissons_ratio", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 0.5), AT(silt_contact_def, poissons_ratio),
+     .doc = "of grains and bodies"},
+    {"restitution", KEY_NUMBER, RANGE(0.05, 1), AT(silt_contact_def, restitution), .doc = "coefficient of restitution"},
+    {"friction", KEY_NUMBER, RANGE(0, 10), AT(silt_contact_def, friction), .doc = "coefficient of sliding friction"},
+    {"rolling_friction", KEY_NUMBER, RANGE(0, 10), AT(silt_contact_def, rolling_friction),
+     .doc = "coefficient of rolling friction"},
+    {"body_friction", KEY_NUMBER, .fallback = "=contact.friction", RANGE(0, 10), AT(silt_contact_def, body_friction),
+     .doc = "sliding friction of bodies against anything"},
+    {"step", KEY_NUMBER, .fallback = "0.15", .flags = KEY_OPEN_LOW, RANGE(0, 0.5), AT(silt_contact_def, step),
+     .doc = "time step of the contacts as a share of the Rayleigh time"},
+    {0}};
+TABLE(contact, "the contact block", silt_contact_def, -1);
+
+static const silt_key body_rows[] = {
+    {"name", KEY_NAME, AT(silt_body_def, name), .doc = "begins its columns in history.csv"},
+    {"shape", KEY_WORD, .flags = KEY_SELECTOR, .words = shape_words, AT(silt_body_def, shape), .doc = "outline"},
+    {"at", KEY_POINT, .unit = "m", AT(silt_body_def, at), .doc = "centroid"},
+    {"angle", KEY_NUMBER, .unit = "degrees", .fallback = "0", AT(silt_body_def, angle), .doc = "counter-clockwise"},
+    {"scale", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_body_def, scale),
+     .doc = "width, or diameter of a disc; 0: a polygon as its points are, the others need it"},
+    {"height", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, .when = ONLY(SHAPE_BOX),
+     AT(silt_body_def, height), .doc = "of a box; 0: as wide as high"},
+    {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_body_def, density), .doc = "mean of the body"},
+    {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_body_def, velocity), .doc = "at the start"},
+    {"motion", KEY_WORD, .fallback = "free", .words = motion_words, AT(silt_body_def, motion),
+     .doc = "free to move, or held"},
+    {"points", KEY_POLYGON, .unit = "m", .when = ONLY(SHAPE_POLYGON), MANY(silt_body_def, n_point, point),
+     .doc = "corners of a polygon about any origin"},
+    {0}};
+TABLE(body, "a body", silt_body_def, offsetof(silt_body_def, shape));
+
+static const silt_key gauge_rows[] = {
+    {"name", KEY_NAME, AT(silt_gauge_def, name), .doc = "column of history.csv"},
+    {"front", KEY_SIGN, .flags = KEY_CHOICE, .words = front_words, .select = GAUGE_FRONT, AT(silt_gauge_def, from),
+     .doc = "foremost x of connected water to this side"},
+    {"height_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_HEIGHT, AT(silt_gauge_def, from),
+     .doc = "top of connected water at this x"},
+    {"wetted_at", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_WETTED, AT(silt_gauge_def, from),
+     .doc = "1 when water is there, else 0"},
+    {"pressure_at", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_PRESSURE, AT(silt_gauge_def, from),
+     .doc = "pressure there, Pa"},
+    {"velocity_at", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_VELOCITY, AT(silt_gauge_def, from),
+     .doc = "velocity there, columns NAME_x, NAME_y, NAME_z"},
+    {"discharge", KEY_SEGMENT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_DISCHARGE, AT(silt_gauge_def, from),
+     .doc = "flow through the segment from its left to its right, m2/s"},
+    {"bed_level_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_BED_LEVEL, AT(silt_gauge_def, from),
+     .doc = "height of the bed at this x"},
+    {"scour_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_SCOUR, AT(silt_gauge_def, from),
+     .doc = "how deep the bed lies under its level at the start, at this x"},
+    {0}};
+TABLE(gauge, "a gauge", silt_gauge_def, offsetof(silt_gauge_def, kind));
+
+static const silt_key where_rows[] = {
+    {"column", KEY_TEXT, AT(silt_check_def, where_column), .doc = "a column of the reference"},
+    {"equals", KEY_NUMBER, AT(silt_check_def, where_value), .doc = "value of it in the rows that count"},
+    {0}};
+TABLE(where, "a row filter", silt_check_def, -1);
+
+static const silt_key check_rows[] = {
+    {"name", KEY_NAME, AT(silt_check_def, name), .doc = "for the report"},
+    {"gauge", KEY_TEXT, .flags = KEY_CHOICE | KEY_SHORTHAND, AT(silt_check_def, column), .doc = "a gauge of the scene"},
+    {"column", KEY_TEXT, .flags = KEY_CHOICE, AT(silt_check_def, column), .doc = "a column of history.csv"},
+    {"reference", KEY_FILE, .flags = KEY_OPTIONAL, AT(silt_check_def, reference), .doc = "CSV file beside the scene"},
+    {"x", KEY_TEXT, .flags = KEY_OPTIONAL, AT(silt_check_def, x),
+     .doc = "abscissa in the reference; default its first column"},
+    {"y", KEY_TEXT, .flags = KEY_OPTIONAL, AT(silt_check_def, y),
+     .doc = "ordinate in the reference; default its second column"},
+    {"where", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &where_table, .presence = PRESENT_TEXT,
+     .present = offsetof(silt_check_def, where_column), .doc = "which rows of the reference count; default all"},
+    {"time_scale", KEY_NUMBER, .fallback = "1", AT(silt_check_def, time_scale),
+     .doc = "the abscissa is time_scale (time + time_shift)"},
+    {"time_shift", KEY_NUMBER, .unit = "s", .fallback = "0", AT(silt_check_def, time_shift), .doc = "see time_scale"},
+    {"scale", KEY_NUMBER, .fallback = "1", AT(silt_check_def, scale), .doc = "the ordinate is scale (column + shift)"},
+    {"shift", KEY_NUMBER, .fallback = "0", AT(silt_check_def, shift), .doc = "see scale"},
+    {"align", KEY_NUMBER, .fallback = ".nan", AT(silt_check_def, align),
+     .doc = "the curve is shifted in time so that both have this ordinate at the same abscissa"},
+    {"window", KEY_PAIR, .fallback = "[-.inf, .inf]", .flags = KEY_INFINITE, AT(silt_check_def, window),
+     .doc = "part of the abscissa that counts"},
+    {"window_value", KEY_PAIR, .fallback = "[-.inf, .inf]", .flags = KEY_INFINITE, AT(silt_check_def, window_value),
+     .doc = "part of the ordinate that counts"},
+    {"norm", KEY_WORD, .fallback = "l2", .words = norm_words, AT(silt_check_def, norm), .doc = "of the difference"},
+    {"relative_to", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_check_def, relative_to),
+     .doc = "what the difference is divided by; 0: the reference, point by point"},
+    {"scalar", KEY_WORD, .fallback = "none", .words = scalar_words, AT(silt_check_def, scalar),
+     .doc = "a number made of the column instead of a reference"},
+    {"value", KEY_NUMBER, .fallback = ".nan", AT(silt_check_def, value), .doc = "expected scalar"},
+    {"range", KEY_PAIR, .fallback = ".nan", .flags = KEY_INFINITE, AT(silt_check_def, low),
+     .doc = "allowed scalar, instead of value and tolerance"},
+    {"tolerance", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_check_def, tolerance),
+     .doc = "of the norm, or of the scalar relative to its value (absolute when that is 0)"},
+    {0}};
+TABLE(check, "a check", silt_check_def, -1);
+
+static const silt_key scene_rows[] = {
+    {"silt", KEY_INTEGER, RANGE(1, 1), AT(silt_scene, version), .doc = "version of these keys"},
+    {"title", KEY_TEXT, .fallback = "", AT(silt_scene, title), .doc = "one line about the scene"},
+    {"dimension", KEY_INTEGER, .fallback = "2", RANGE(2, 3), AT(silt_scene, dimension), .doc = "2 for now"},
+    {"time", KEY_BLOCK, .sub = &time_table, .doc = "how long, how often, how fine"},
+    {"gravity", KEY_POINT, .unit = "m/s2", AT(silt_scene, gravity), .doc = "acceleration, for example [0, -9.81]"},
+    {"fluid", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &fluid_table, .presence = PRESENT_FLAG,
+     .present = offsetof(silt_scene, fluid.on), AT(silt_scene, fluid), .doc = "the water"},
+    {"walls", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &wall_table, MANY(silt_scene, n_wall, wall),
+     .doc = "what holds it"},
+    {"bed", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &bed_table, .presence = PRESENT_FLAG,
+     .present = offsetof(silt_scene, bed.on), AT(silt_scene, bed), .doc = "ground that the water can erode"},
+    {"grains", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &grains_table, .presence = PRESENT_FLAG,
+     .present = offsetof(silt_scene, grains.on), AT(silt_scene, grains), .doc = "loose grains; needed with a bed"},
+    {"contact", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &contact_table, .presence = PRESENT_FLAG,
+     .present = offsetof(silt_scene, contact.on), AT(silt_scene, contact),
+     .doc = "how solids touch; needed with a bed, grains or bodies"},
+    {"bodies", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &body_table, MANY(silt_scene, n_body, body),
+     .doc = "rigid objects"},
+    {"gauges", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &gauge_table, MANY(silt_scene, n_gauge, gauge),
+     .doc = "what is measured at every step"},
+    {"checks", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &check_table, MANY(silt_scene, n_check, check),
+     .doc = "what the result is held against"},
+    {0}};
+const silt_key_table silt_scene_keys = {"the scene", sizeof(silt_scene), scene_rows, -1};
+
+_Static_assert(offsetof(silt_region, hi) == offsetof(silt_region, lo) + 3 * sizeof(double), "box: lo, hi");
+_Static_assert(offsetof(silt_gauge_def, to) == offsetof(silt_gauge_def, from) + 3 * sizeof(double),
+               "segment: from, to");
+_Static_assert(offsetof(silt_check_def, high) == offsetof(silt_check_def, low) + sizeof(double), "pair: low, high");
+_Static_assert(sizeof(silt_shape) == sizeof(int), "words are stored as int");

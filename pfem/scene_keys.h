@@ -1,0 +1,148 @@
+/** @file scene_keys.h
+ * The inside of the scene reader, shared by scene_*.c only: the table of keys, the YAML text as a tree with positions,
+ * and the list of complaints. Flow: tree (text, -D) -> read (tree + table -> struct) -> check (what no single key can
+ * tell)
+ * -> write (struct + table -> resolved text).
+ */
+#ifndef SILT_SCENE_KEYS_H
+#define SILT_SCENE_KEYS_H
+
+#include "scene.h"
+
+// the table of keys ----------------------------------------------------------------------------------
+typedef enum {
+    KEY_NUMBER = 1, // double
+    KEY_INTEGER,    // int
+    KEY_LONG,       // int64_t
+    KEY_SWITCH,     // bool
+    KEY_WORD,       // int (an enum), one of words
+    KEY_SIGN,       // double, one of words
+    KEY_TEXT,       // char *
+    KEY_NAME,       // char *, letters, digits, underscores
+    KEY_FILE,       // char *, made absolute
+    KEY_SERIES,     // silt_series, read from a CSV
+    KEY_POINT,      // double[3], two or three numbers
+    KEY_PAIR,       // double[2]
+    KEY_SEGMENT,    // double[6], two different points
+    KEY_BOX,        // double[6], two opposite corners, the lower first
+    KEY_CHAIN,      // int at count, double * of 3 per point: at least 2 points
+    KEY_POLYGON,    // int at count, double * of 3 per point: at least 3 points, made counter-clockwise
+    KEY_OUTLINE,    // a box read as a KEY_CHAIN of its 4 corners
+    KEY_BLOCK,      // mapping
+    KEY_LIST,       // int at count, array of structs: sequence of mappings
+} silt_key_kind;
+
+enum {
+    KEY_OPEN_LOW = 1,   // low itself is not allowed
+    KEY_OPEN_HIGH = 2,  // high itself is not allowed
+    KEY_INFINITE = 4,   // .inf is allowed
+    KEY_CHOICE = 8,     // exactly one of the choices of its table is given; sets the selector to `select`
+    KEY_SELECTOR = 16,  // its value is the selector of its table
+    KEY_SHORTHAND = 32, // never written back: another key holds the same
+    KEY_OPTIONAL = 64,  // list or block that may be absent; text without default
+};
+
+/** how to see in the struct whether a block was there */
+typedef enum { PRESENT_ALWAYS = 0, PRESENT_FLAG, PRESENT_WORD, PRESENT_TEXT } silt_presence;
+
+typedef struct silt_word {
+    const char *text; // NULL ends the list
+    int value;
+} silt_word;
+
+typedef struct silt_key_table silt_key_table;
+typedef struct silt_key {
+    const char *name;
+    silt_key_kind kind;
+    unsigned flags;
+    const char *unit;
+    const char *fallback; // default as YAML; NULL: required; ".nan": none; "=block.key": the value of that key
+    double low, high;     // range; both 0: any
+    const silt_word *words;
+    size_t offset, count;      // in the struct of the table
+    const silt_key_table *sub; // of blocks and lists
+    silt_presence presence;
+    size_t present; // offset of the flag, word or text
+    unsigned when;  // bits of the selector's values for which the key is used; 0: always
+    int select;
+    const char *doc;
+} silt_key;
+
+struct silt_key_table {
+    const char *what;    // one item, for messages: "a region"
+    size_t size;         // of the struct
+    const silt_key *key; // ends with a row without name
+    int selector;        // offset of an int that says which rows with `when` are used, -1: none
+};
+
+extern const silt_key_table silt_scene_keys;
+/** row of that name, or NULL */
+const silt_key *silt_key_find(const silt_key_table *table, const char *name);
+/** range, words or form of a key in words: "a number in m, > 0"; owned by the caller */
+char *silt_key_allowed(const silt_key *key);
+/** the nearest of the table's names, or NULL when none is near */
+const char *silt_key_nearest(const silt_key_table *table, const char *name);
+const char *silt_word_nearest(const silt_word *words, const char *text);
+/** the smaller of edit distance (swaps count once) and limit + 1 */
+int silt_text_distance(const char *a, const char *b, int limit);
+/** a YAML 1.2 number: decimal, .inf or .nan */
+bool silt_text_number(const char *text, double *value);
+
+// the text as a tree -----------------------------------------------------------------------------------
+typedef enum { TREE_SCALAR = 1, TREE_LIST, TREE_MAPPING } silt_tree_kind;
+typedef struct silt_tree {
+    silt_tree_kind kind;
+    bool quoted, open;        // scalar in quotes; container not yet closed
+    int source, line, column; // of the value, from 1
+    int key_source, key_line, key_column;
+    char *key;  // owned, in a mapping
+    char *text; // owned, scalar
+    int n_item, capacity;
+    struct silt_tree **item; // owned array, items owned by the reader
+} silt_tree;
+
+enum { SCENE_COMPLAINTS = 50, SCENE_DEPTH = 64, SCENE_NODES = 1000000, SCENE_BYTES = 8 << 20 };
+
+typedef struct silt_source {
+    char *name, *text; // owned
+    size_t size;
+    int shift; // columns before the text's first one (-D path=)
+} silt_source;
+typedef struct silt_complaint {
+    int source, line, column, order;
+    char *text; // owned
+} silt_complaint;
+
+/** everything that lives while a scene is read */
+typedef struct silt_reader {
+    int n_source, source_capacity;
+    silt_source *source; // 0 the file, then one per -D
+    int n_node, node_capacity;
+    silt_tree **node; // owned, all of them
+    silt_tree *root;
+    int n_complaint; // may pass SCENE_COMPLAINTS, the rest is only counted
+    silt_complaint complaint[SCENE_COMPLAINTS];
+    const char *folder; // borrowed from the scene
+} silt_reader;
+
+/** Reads the file and the -D texts into reader->root. Syntax errors and -D errors become complaints. */
+void silt_tree_read(silt_reader *reader, const char *path, int n_set, const char *const *set);
+void silt_reader_clear(silt_reader *reader);
+silt_tree *silt_tree_item(const silt_tree *mapping, const char *key); // NULL when absent, or when mapping is NULL
+/** the node at a path like "bodies.0.name", or NULL */
+silt_tree *silt_tree_find(const silt_tree *root, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/** Adds a complaint at the node's value (or at its key). Text: "key 'a.b': found ..., allowed ..." */
+void silt_complain(silt_reader *reader, const silt_tree *node, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+void silt_complain_key(silt_reader *reader, const silt_tree *node, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+/** All complaints in the order of the text, each with its line and a caret, into err. SILT_OK when there are none. */
+silt_status silt_complaints_report(silt_reader *reader, silt_error *err);
+
+// checks over several keys, and writing ------------------------------------------------------------------
+void silt_scene_check(silt_reader *reader, silt_scene *scene);
+/** the resolved scene as YAML; owned by the caller. names: files with their folder (true), or their last part only */
+char *silt_scene_text(const silt_scene *scene, bool folders);
+
+#endif

@@ -1,0 +1,211 @@
+/** @file scene_write.c
+ * The resolved scene: every key that counts, with defaults and replacements worked in, as YAML that reads back to the
+ * same.
+ */
+#include "scene_keys.h"
+
+static bool write_present(const silt_key *key, const void *base) {
+    const char *at = (const char *)base + key->present;
+    int word;
+    switch (key->presence) {
+    case PRESENT_FLAG:
+        return *(const bool *)at;
+    case PRESENT_WORD:
+        memcpy(&word, at, sizeof word);
+        return word != 0;
+    case PRESENT_TEXT:
+        return *(char *const *)at != NULL;
+    case PRESENT_ALWAYS:
+        break;
+    }
+    return true;
+}
+
+static void write_number(FILE *to, double x) {
+    if (isinf(x)) {
+        fprintf(to, x > 0 ? ".inf" : "-.inf");
+        return;
+    }
+    // the fewest digits that read back to the same bits
+    char text[32];
+    for (int digits = 15; digits <= 17; digits++) {
+        snprintf(text, sizeof text, "%.*g", digits, x);
+        if (strtod(text, NULL) == x)
+            break;
+    }
+    fprintf(to, "%s", text);
+}
+
+// numbers of one point or pair in brackets; the third coordinate only when there is one
+static void write_numbers(FILE *to, int n, const double *x) {
+    if (n == 3 && x[2] == 0)
+        n = 2;
+    for (int i = 0; i < n; i++) {
+        fprintf(to, i ? ", " : "[");
+        write_number(to, x[i]);
+    }
+    fputc(']', to);
+}
+
+static void write_points(FILE *to, int n, const double *x) {
+    for (int i = 0; i < n; i++) {
+        fprintf(to, i ? ", " : "[");
+        write_numbers(to, 3, x + 3 * i);
+    }
+    fputc(']', to);
+}
+
+// in double quotes; what YAML may take for a line break or does not print is escaped
+static void write_text(FILE *to, const char *text) {
+    fputc('"', to);
+    for (const unsigned char *c = (const unsigned char *)text; *c;) {
+        int n = *c < 0x80 ? 1 : *c < 0xe0 ? 2 : *c < 0xf0 ? 3 : 4;
+        uint32_t code = n == 1 ? *c : *c & (0xff >> (n + 1));
+        for (int i = 1; i < n; i++)
+            code = code << 6 | (c[i] & 0x3f);
+        bool odd = code < 0x20 || (code >= 0x7f && code < 0xa0) || code == 0x2028 || code == 0x2029 || code == 0xfeff ||
+                   (code & 0xfffe) == 0xfffe;
+        if (*c == '"' || *c == '\\')
+            fprintf(to, "\\%c", *c);
+        else if (odd && code > 0xffff)
+            fprintf(to, "\\U%08x", (unsigned)code);
+        else if (odd)
+            fprintf(to, "\\u%04x", (unsigned)code);
+        else
+            fwrite(c, 1, (size_t)n, to);
+        c += n;
+    }
+    fputc('"', to);
+}
+
+static const char *write_word(const silt_key *key, int value) {
+    for (const silt_word *word = key->words; word->text; word++)
+        if (word->value == value)
+            return word->text;
+    return "none";
+}
+
+// true when the row has something to say about this struct
+static bool write_counts(const silt_key_table *table, const silt_key *key, const void *base) {
+    const void *at = (const char *)base + key->offset, *count = (const char *)base + key->count;
+    int kind = 0;
+    if (table->selector >= 0)
+        memcpy(&kind, (const char *)base + table->selector, sizeof kind);
+    if (key->flags & KEY_SHORTHAND || (key->when && !(key->when >> kind & 1)) || (key->select && key->select != kind))
+        return false;
+    switch (key->kind) {
+    case KEY_NUMBER:
+    case KEY_PAIR:
+        return !isnan(*(const double *)at);
+    case KEY_TEXT:
+    case KEY_NAME:
+    case KEY_FILE:
+        return *(char *const *)at != NULL;
+    case KEY_SERIES:
+        return ((const silt_series *)at)->n_row > 0;
+    case KEY_LIST:
+    case KEY_CHAIN:
+    case KEY_POLYGON:
+        return *(const int *)count > 0;
+    case KEY_BLOCK:
+        return write_present(key, base);
+    default:
+        return true;
+    }
+}
+
+static void write_file(FILE *to, const char *path, bool folders) {
+    const char *slash = strrchr(path, '/');
+    write_text(to, folders || !slash ? path : slash + 1);
+}
+
+static void write_value(FILE *to, const silt_key *key, const void *base, bool folders) {
+    const void *at = (const char *)base + key->offset;
+    int number = 0;
+    switch (key->kind) {
+    case KEY_NUMBER:
+        write_number(to, *(const double *)at);
+        break;
+    case KEY_INTEGER:
+        fprintf(to, "%d", *(const int *)at);
+        break;
+    case KEY_LONG:
+        fprintf(to, "%lld", (long long)*(const int64_t *)at);
+        break;
+    case KEY_SWITCH:
+        fprintf(to, *(const bool *)at ? "true" : "false");
+        break;
+    case KEY_WORD:
+        memcpy(&number, at, sizeof number);
+        fprintf(to, "%s", write_word(key, number));
+        break;
+    case KEY_SIGN:
+        fprintf(to, "%s", write_word(key, (int)*(const double *)at));
+        break;
+    case KEY_TEXT:
+    case KEY_NAME:
+        write_text(to, *(char *const *)at);
+        break;
+    case KEY_FILE:
+        write_file(to, *(char *const *)at, folders);
+        break;
+    case KEY_SERIES:
+        write_file(to, ((const silt_series *)at)->path, folders);
+        break;
+    case KEY_POINT:
+        write_numbers(to, 3, at);
+        break;
+    case KEY_PAIR:
+        write_numbers(to, 2, at);
+        break;
+    case KEY_SEGMENT:
+    case KEY_BOX:
+        write_points(to, 2, at);
+        break;
+    case KEY_CHAIN:
+    case KEY_POLYGON:
+        write_points(to, *(const int *)((const char *)base + key->count), *(double *const *)at);
+        break;
+    default:
+        break;
+    }
+}
+
+// `dash`: the first row goes behind "- " of a list
+static void write_table(FILE *to, const silt_key_table *table, const void *base, int indent, bool dash, bool folders) {
+    for (const silt_key *key = table->key; key->name; key++) {
+        if (!write_counts(table, key, base))
+            continue;
+        fprintf(to, "%*s%s%s:", dash ? indent - 2 : indent, "", dash ? "- " : "", key->name);
+        dash = false;
+        if (key->kind == KEY_BLOCK) {
+            fputc('\n', to);
+            long before = ftell(to);
+            write_table(to, key->sub, (const char *)base + key->offset, indent + 2, false, folders);
+            // a block may have nothing to say but that it is there
+            if (ftell(to) == before)
+                fprintf(to, "%*s{}\n", indent + 2, "");
+        } else if (key->kind == KEY_LIST) {
+            fputc('\n', to);
+            int n = *(const int *)((const char *)base + key->count);
+            const char *item = *(char *const *)((const char *)base + key->offset);
+            for (int i = 0; i < n; i++)
+                write_table(to, key->sub, item + (size_t)i * key->sub->size, indent + 4, true, folders);
+        } else {
+            fputc(' ', to);
+            write_value(to, key, base, folders);
+            fputc('\n', to);
+        }
+    }
+}
+
+char *silt_scene_text(const silt_scene *scene, bool folders) {
+    char *text = NULL;
+    size_t size = 0;
+    FILE *to = open_memstream(&text, &size);
+    if (!to)
+        return silt_text("%s", "");
+    write_table(to, &silt_scene_keys, scene, 0, false, folders);
+    fclose(to);
+    return text;
+}

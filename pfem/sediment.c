@@ -1,0 +1,219 @@
+// what goes from the bed to the grains and back: release, parcels that wait for room, deposition
+#include "run.h"
+
+#define DEPOSIT_SPEED 0.05  // of sqrt((s - 1) g d)
+#define DEPOSIT_FORCE 0.1   // net force, of the submerged weight
+#define DEPOSIT_TIME 10     // times sqrt(d/g), at rest for so long
+#define RELEASE_MOST 64     // patches in one step
+
+static double gravity_of(const silt_scene *scene) { return hypot(scene->gravity[0], scene->gravity[1]); }
+
+static void remember_cell(silt_run *run, const int cell[3], double area, bool freed) {
+    if (freed) {
+        SILT_RESERVE(run->freed, run->freed_capacity, run->n_freed + 1);
+        SILT_RESERVE(run->freed_area, run->freed_area_capacity, run->n_freed + 1);
+        memcpy(run->freed[run->n_freed], cell, sizeof run->freed[0]);
+        run->freed_area[run->n_freed++] = area;
+    } else {
+        SILT_RESERVE(run->grown, run->grown_capacity, run->n_grown + 1);
+        SILT_RESERVE(run->grown_area, run->grown_area_capacity, run->n_grown + 1);
+        memcpy(run->grown[run->n_grown], cell, sizeof run->grown[0]);
+        run->grown_area[run->n_grown++] = area;
+    }
+}
+
+static void release_node(silt_run *run, int node) {
+    const silt_scene *scene = run->scene;
+    silt_patch patch;
+    silt_bed_patch(&run->bed, node, &patch);
+    if (patch.n_cell == 0)
+        return;
+    for (int k = 0; k < patch.n_cell; k++)
+        remember_cell(run, run->bed.cell[patch.cell[k]], run->bed.area[patch.cell[k]], true);
+    silt_bed_release(&run->bed, scene, &patch);
+    run->ledger.released_mass += patch.mass;
+
+    // equal parcels near the wanted size
+    const double d = scene->grains.parcel, r_patch = silt_coupling_dem.parcel_radius(run->coupling, patch.mass);
+    const int n = (int)silt_max(1, floor(silt_square(2 * r_patch / d) + 0.5));
+    for (int k = 0; k < n; k++) {
+        SILT_RESERVE(run->waiting, run->waiting_capacity, run->n_waiting + 1);
+        silt_waiting *waiting = &run->waiting[run->n_waiting++];
+        *waiting = (silt_waiting){.mass = patch.mass / n, .reach = silt_max(patch.height, 2 * r_patch)};
+        memcpy(waiting->x, patch.centre, sizeof waiting->x);
+        memcpy(waiting->normal, patch.normal, sizeof waiting->normal);
+    }
+}
+
+void silt_run_release(silt_run *run) {
+    if (!run->scene->bed.on)
+        return;
+    int due[RELEASE_MOST];
+    const int n = silt_bed_due(&run->bed, run->scene, RELEASE_MOST, due);
+    for (int k = 0; k < n; k++) {
+        // a neighbour's release may have taken it along, or reset it
+        if (!run->bed.alive[due[k]] || !run->bed.exposed[due[k]])
+            continue;
+        release_node(run, due[k]);
+    }
+    if (run->bed.revision != run->bed_revision) {
+        const int loose = silt_bed_loose(&run->bed, run->scene, RELEASE_MOST, due);
+        for (int k = 0; k < loose; k++)
+            if (run->bed.alive[due[k]])
+                release_node(run, due[k]);
+    }
+    if (run->coupling && run->bed.revision != run->bed_revision) {
+        silt_coupling_dem.bed_changed(run->coupling, &run->bed);
+        run->bed_revision = run->bed.revision;
+    }
+}
+
+// a place for the parcel: out along the normal, then to the sides
+static bool find_room(const silt_run *run, const silt_waiting *waiting, double radius, int n_placed,
+                      const silt_release *placed, double out[2]) {
+    const double *n = waiting->normal, tangent[2] = {-n[1], n[0]};
+    for (int out_step = 0; out_step <= 12; out_step++)
+        for (int side = 0; side < 5; side++) {
+            const double along = (side + 1) / 2 * (side % 2 ? 1 : -1) * 0.5 * radius;
+            const double outward = out_step * (waiting->reach + radius) / 12;
+            for (int d = 0; d < 2; d++)
+                out[d] = waiting->x[d] + outward * n[d] + along * tangent[d];
+            int segment;
+            if (run->walls.count && silt_walls_distance(&run->walls, out, &segment) < radius)
+                continue;
+            bool free = silt_coupling_dem.room(run->coupling, out, radius);
+            for (int k = 0; k < n_placed && free; k++)
+                free = hypot(out[0] - placed[k].x[0], out[1] - placed[k].x[1]) > radius + placed[k].radius;
+            if (free)
+                return true;
+        }
+    return false;
+}
+
+void silt_run_place(silt_run *run) {
+    int n_placed = 0, kept = 0, capacity = 0;
+    silt_release *placed = NULL;
+    for (int k = 0; k < run->n_waiting; k++) {
+        const silt_waiting *waiting = &run->waiting[k];
+        silt_release release = {.mass = waiting->mass};
+        release.radius = silt_coupling_dem.parcel_radius(run->coupling, waiting->mass);
+        if (find_room(run, waiting, release.radius, n_placed, placed, release.x)) {
+            SILT_RESERVE(placed, capacity, n_placed + 1);
+            placed[n_placed++] = release;
+        } else
+            run->waiting[kept++] = *waiting;
+    }
+    run->n_waiting = kept;
+    if (n_placed)
+        silt_coupling_dem.release(run->coupling, n_placed, placed);
+    free(placed);
+}
+
+// physics 7: slow, balanced, carried by the bed, and so for a while
+static bool grain_rests(const silt_run *run, const silt_grain_state *grains, int k) {
+    const silt_scene *scene = run->scene;
+    const double g = gravity_of(scene), d = 2 * grains->radius[k];
+    const double lighter = scene->fluid.on ? scene->bed.density / scene->fluid.density - 1 : 1;
+    const double speed = hypot(grains->v[3 * k], grains->v[3 * k + 1]);
+    const double weight = grains->mass[k] * g * (scene->fluid.on ? 1 - scene->fluid.density / scene->bed.density : 1);
+    return speed < DEPOSIT_SPEED * sqrt(silt_max(lighter, 0.01) * g * d) && grains->net_force[k] < DEPOSIT_FORCE * weight &&
+           grains->contacts[k] >= 2 && grains->on_bed[k];
+}
+
+// node of the new bed cells needs its place in the water's cloud: water nodes that crowd it leave
+static void clear_water(silt_run *run, const silt_deposit *deposit) {
+    for (int e = 0; e < deposit->n_cell; e++)
+        remember_cell(run, run->bed.cell[deposit->cell[e]], run->bed.area[deposit->cell[e]], false);
+}
+
+silt_status silt_run_deposit(silt_run *run, silt_error *err) {
+    (void)err;
+    const silt_scene *scene = run->scene;
+    const silt_grain_state *grains = silt_coupling_dem.grains(run->coupling);
+    if (!scene->bed.on || !scene->bed.deposition || !isfinite(scene->bed.work))
+        return SILT_OK;
+    const double g = gravity_of(scene);
+    // the clocks of rest, merged by id
+    int old = 0, kept = 0;
+    silt_rest *fresh = silt_alloc((size_t)grains->count + 1, sizeof *fresh);
+    bool changed = false;
+    for (int k = 0; k < grains->count; k++) {
+        while (old < run->n_rest && run->rest[old].id < grains->id[k])
+            old++;
+        const double had = old < run->n_rest && run->rest[old].id == grains->id[k] ? run->rest[old].time : 0;
+        if (!grain_rests(run, grains, k))
+            continue;
+        const double now = had + run->dt;
+        if (now > DEPOSIT_TIME * sqrt(2 * grains->radius[k] / silt_max(g, 1e-12))) {
+            silt_deposit deposit = {0};
+            const double x[2] = {grains->x[3 * k], grains->x[3 * k + 1]};
+            if (silt_bed_deposit(&run->bed, scene, x, grains->radius[k], grains->mass[k], &deposit) != DEPOSIT_REFUSED) {
+                silt_coupling_dem.deposit(run->coupling, k);
+                run->ledger.deposited_mass += grains->mass[k];
+                clear_water(run, &deposit);
+                changed = true;
+                continue;
+            }
+        }
+        fresh[kept++] = (silt_rest){grains->id[k], now};
+    }
+    SILT_RESERVE(run->rest, run->rest_capacity, kept + 1);
+    memcpy(run->rest, fresh, (size_t)kept * sizeof *fresh);
+    run->n_rest = kept;
+    free(fresh);
+    if (changed) {
+        silt_coupling_dem.bed_changed(run->coupling, &run->bed);
+        run->bed_revision = run->bed.revision;
+    }
+    return SILT_OK;
+}
+
+void silt_run_bed_sync(silt_run *run) {
+    if (!run->scene->bed.on || !run->scene->fluid.on)
+        return;
+    silt_bed *bed = &run->bed;
+    silt_nodes *nodes = &run->nodes;
+    // nodes of freed cells that have no bed left become water, and of grown cells that are new stand on the bed
+    for (int k = 0; k < run->n_freed; k++)
+        for (int a = 0; a < 3; a++) {
+            const int node = run->freed[k][a];
+            if (bed->alive[node])
+                continue;
+            if (bed->fluid_node[node] < 0)
+                bed->fluid_node[node] = silt_nodes_add(nodes, NODE_FLUID, -1, bed->x[node]);
+            const int i = bed->fluid_node[node];
+            if (nodes->kind[i] != NODE_BED && nodes->owner[i] != -1)
+                continue;
+            nodes->kind[i] = NODE_FLUID;
+            nodes->owner[i] = -1;
+            // on a tank wall it stays on the wall
+            const double *x = nodes->x + 2 * i;
+            for (int s = 0, found = 0; s < run->walls.count && found < 2; s++) {
+                const double *from = run->walls.from[s], *to = run->walls.to[s], *n = run->walls.normal[s];
+                const double length = hypot(to[0] - from[0], to[1] - from[1]), tiny = 1e-6 * run->scene->fluid.size;
+                const double off = (x[0] - from[0]) * n[0] + (x[1] - from[1]) * n[1];
+                const double along = ((x[0] - from[0]) * (to[0] - from[0]) + (x[1] - from[1]) * (to[1] - from[1])) / length;
+                if (fabs(off) < tiny && along > -tiny && along < length + tiny)
+                    nodes->wall[i][found++] = s;
+            }
+        }
+    for (int k = 0; k < bed->n_node; k++) {
+        const int i = bed->fluid_node[k];
+        if (bed->alive[k] && bed->exposed[k] && i < 0)
+            bed->fluid_node[k] = silt_nodes_add(nodes, NODE_BED, k, bed->x[k]);
+        else if (bed->alive[k] && !bed->exposed[k] && i >= 0) {
+            silt_memory_extend(&run->memory, nodes->count);
+            run->memory.dead[i] = 1; // buried
+        }
+    }
+    // water nodes too near to a new bed node leave
+    silt_memory_extend(&run->memory, nodes->count);
+    for (int k = 0; k < run->n_grown; k++)
+        for (int a = 0; a < 3; a++) {
+            const double *x = bed->x[run->grown[k][a]];
+            for (int i = 0; i < nodes->count; i++)
+                if (nodes->kind[i] == NODE_FLUID && nodes->wall[i][1] < 0 &&
+                    hypot(nodes->x[2 * i] - x[0], nodes->x[2 * i + 1] - x[1]) < 0.4 * run->scene->fluid.size)
+                    run->memory.dead[i] = 1;
+        }
+}

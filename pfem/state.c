@@ -1,0 +1,122 @@
+// checkpoints: everything that the next step depends on, nothing that it derives
+#include "run.h"
+
+// one list for both directions
+#define STATE_SCALARS(X)                                                                                               \
+    X("run/step", STORE_LONG, run->step)                                                                               \
+    X("run/frame", STORE_LONG, run->frame)                                                                             \
+    X("run/tick", STORE_LONG, run->tick)                                                                               \
+    X("run/offset", STORE_DOUBLE, run->offset)                                                                         \
+    X("run/time", STORE_DOUBLE, run->time)                                                                             \
+    X("run/dt", STORE_DOUBLE, run->dt)                                                                                 \
+    X("run/next_id", STORE_LONG, run->nodes.next_id)                                                                   \
+    X("mesh/revision", STORE_LONG, run->mesh.revision)                                                                 \
+    X("bed/revision_known", STORE_LONG, run->bed_revision)
+
+#define STATE_NODES(X)                                                                                                 \
+    X("nodes/x", STORE_DOUBLE, run->nodes.x, 2)                                                                        \
+    X("nodes/v", STORE_DOUBLE, run->nodes.v, 2)                                                                        \
+    X("nodes/p", STORE_DOUBLE, run->nodes.p, 1)                                                                        \
+    X("nodes/debt", STORE_DOUBLE, run->nodes.debt, 1)                                                                  \
+    X("nodes/id", STORE_LONG, run->nodes.id, 1)                                                                        \
+    X("nodes/kind", STORE_BYTE, run->nodes.kind, 1)                                                                    \
+    X("nodes/owner", STORE_INT, run->nodes.owner, 1)                                                                   \
+    X("nodes/wall", STORE_INT, run->nodes.wall, 2)
+
+silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
+    silt_store *store = NULL;
+    const size_t n = (size_t)run->nodes.count;
+    silt_status status = silt_store_create(&store, path, err);
+#define PUT(name, type, value)                                                                                         \
+    if (status == SILT_OK)                                                                                             \
+        status = silt_store_put(store, name, type, 1, &(value), err);
+    STATE_SCALARS(PUT)
+#undef PUT
+#define PUT(name, type, array, per)                                                                                    \
+    if (status == SILT_OK)                                                                                             \
+        status = silt_store_put(store, name, type, n * (per), array, err);
+    STATE_NODES(PUT)
+#undef PUT
+    if (status == SILT_OK)
+        status = silt_store_put(store, "mesh/cell", STORE_INT, 3 * (size_t)run->mesh.n_cell, run->mesh.cell, err);
+    if (status == SILT_OK)
+        status = silt_store_put(store, "run/ledger", STORE_BYTE, sizeof run->ledger, &run->ledger, err);
+    if (status == SILT_OK)
+        status = silt_store_put(store, "sediment/waiting", STORE_BYTE, (size_t)run->n_waiting * sizeof *run->waiting, run->waiting, err);
+    if (status == SILT_OK)
+        status = silt_store_put(store, "sediment/rest", STORE_BYTE, (size_t)run->n_rest * sizeof *run->rest, run->rest, err);
+    if (status == SILT_OK)
+        status = silt_gauges_save(run->gauges, store, err);
+    if (status == SILT_OK && run->scene->bed.on)
+        status = silt_bed_save(&run->bed, store, err);
+    if (status == SILT_OK && run->coupling)
+        status = silt_coupling_dem.save(run->coupling, store, err);
+    if (status == SILT_OK)
+        status = silt_store_commit(&store, err);
+    else
+        silt_store_close(&store);
+    // what outlives a step is dropped on both sides of a checkpoint
+    silt_pressure_forget(run->fluid.pressure);
+    return status;
+}
+
+static silt_status take_list(silt_store *store, const char *name, size_t size, void **data, int *count, int *capacity,
+                             silt_error *err) {
+    size_t bytes;
+    SILT_TRY(silt_store_count(store, name, &bytes, err));
+    *count = (int)(bytes / size);
+    *data = silt_grow(*data, capacity, *count + 1, size);
+    return silt_store_take(store, name, STORE_BYTE, bytes, *data, err);
+}
+
+silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
+    const silt_scene *scene = run->scene;
+    size_t n = 0, n_index = 0;
+    SILT_TRY(silt_store_count(store, "nodes/p", &n, err));
+    const double nowhere[2] = {0, 0};
+    for (size_t i = 0; i < n; i++)
+        silt_nodes_add(&run->nodes, NODE_FLUID, -1, nowhere);
+#define TAKE(name, type, value) SILT_TRY(silt_store_take(store, name, type, 1, &(value), err));
+    STATE_SCALARS(TAKE)
+#undef TAKE
+#define TAKE(name, type, array, per)                                                                                   \
+    if (n)                                                                                                             \
+        SILT_TRY(silt_store_take(store, name, type, n * (per), array, err));
+    STATE_NODES(TAKE)
+#undef TAKE
+    SILT_TRY(silt_store_count(store, "mesh/cell", &n_index, err));
+    run->mesh.n_cell = (int)(n_index / 3);
+    SILT_RESERVE(run->mesh.cell, run->mesh.cell_capacity, run->mesh.n_cell + 1);
+    if (n_index)
+        SILT_TRY(silt_store_take(store, "mesh/cell", STORE_INT, n_index, run->mesh.cell, err));
+    SILT_TRY(silt_store_take(store, "run/ledger", STORE_BYTE, sizeof run->ledger, &run->ledger, err));
+    SILT_TRY(take_list(store, "sediment/waiting", sizeof *run->waiting, (void **)&run->waiting, &run->n_waiting,
+                       &run->waiting_capacity, err));
+    SILT_TRY(take_list(store, "sediment/rest", sizeof *run->rest, (void **)&run->rest, &run->n_rest, &run->rest_capacity, err));
+
+    if (scene->bed.on)
+        SILT_TRY(silt_bed_load(&run->bed, store, err));
+    if (silt_scene_has_dem(scene)) {
+        silt_coupling_def def;
+        silt_coupling_def_fill(run, &def);
+        SILT_TRY(silt_coupling_dem.load_state(&run->coupling, &def, store, err));
+        run->barrier.bodies = silt_coupling_dem.bodies(run->coupling);
+    }
+    run->barrier.bed = scene->bed.on ? &run->bed : NULL;
+    run->barrier.walls = &run->walls;
+
+    // the topology is derived anew from the cells, under the revision it had
+    if (scene->fluid.on) {
+        const int64_t revision = run->mesh.revision;
+        silt_mesh_connect(&run->mesh, &run->nodes);
+        run->mesh.revision = revision;
+        silt_locator_build(&run->locator, &run->mesh, run->nodes.x, scene->fluid.size);
+    }
+    silt_view view = {.scene = scene, .ledger = &run->ledger, .bed = scene->bed.on ? &run->bed : NULL};
+    SILT_TRY(silt_gauges_create(&run->gauges, &view, err));
+    SILT_TRY(silt_gauges_load(run->gauges, store, err));
+    // porosity of the state that was saved
+    if (run->coupling && scene->fluid.on)
+        SILT_TRY(silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
+    return SILT_OK;
+}

@@ -1,0 +1,510 @@
+// checks: the scene's demands on history.csv, curves against reference files and scalars against values
+
+#include "output.h"
+
+#include <errno.h>
+#include <unistd.h>
+
+// a windowed scalar needs a history that reaches the window's end, up to this share of the window
+#define VERIFY_SLACK 0.01
+
+// ---------------------------------------------------------------- history
+
+/** the columns of history.csv that the checks need; it may be long, so the rest is not kept */
+typedef struct verify_history {
+    int n_row, time_capacity, value_capacity;
+    double *time;  // owned, one per row
+    double *value; // owned, n_check per row, NaN where the column is absent
+    int *column;   // owned, one per check: its column in the file, -1: absent
+} verify_history;
+
+static void history_clear(verify_history *history) {
+    free(history->time);
+    free(history->value);
+    free(history->column);
+    memset(history, 0, sizeof *history);
+}
+
+// index of a name in the header line, -1: absent
+static int history_find(const char *header, const char *name) {
+    size_t length = strlen(name);
+    for (int i = 0;; i++) {
+        size_t field = strcspn(header, ",\r\n");
+        if (field == length && strncmp(header, name, length) == 0)
+            return i;
+        if (header[field] != ',')
+            return -1;
+        header += field + 1;
+    }
+}
+
+static double history_number(const char *row, int column) {
+    for (; row && column > 0; column--)
+        row = (row = strchr(row, ',')) ? row + 1 : NULL;
+    char *end;
+    double value = row ? strtod(row, &end) : NAN;
+    return row && end > row ? value : NAN;
+}
+
+static silt_status history_read(verify_history *history, const silt_scene *scene, const char *out, silt_error *err) {
+    char *path = silt_text("%s/history.csv", out), *line = NULL;
+    size_t capacity = 0;
+    ssize_t length;
+    silt_status status = SILT_OK;
+    FILE *from = fopen(path, "r");
+    if (!from) {
+        status = silt_fail(err, SILT_FAILED, "%s: cannot be read (%s)", path, strerror(errno));
+        goto done;
+    }
+    int time = getline(&line, &capacity, from) > 0 ? history_find(line, "time") : -1;
+    if (time < 0) {
+        status = silt_fail(err, SILT_FAILED, "%s: its first line has no column time", path);
+        goto done;
+    }
+    int n = scene->n_check;
+    history->column = silt_alloc((size_t)n + 1, sizeof *history->column);
+    for (int i = 0; i < n; i++)
+        history->column[i] = history_find(line, scene->check[i].column);
+    // a last line without its end is what a killed run left, and does not count
+    while ((length = getline(&line, &capacity, from)) > 0 && line[length - 1] == '\n') {
+        int row = history->n_row++;
+        SILT_RESERVE(history->time, history->time_capacity, row + 1);
+        SILT_RESERVE(history->value, history->value_capacity, (row + 1) * n);
+        history->time[row] = history_number(line, time);
+        for (int i = 0; i < n; i++)
+            history->value[row * n + i] = history->column[i] < 0 ? NAN : history_number(line, history->column[i]);
+    }
+done:
+    if (from)
+        fclose(from);
+    free(line);
+    free(path);
+    return status;
+}
+
+// ---------------------------------------------------------------- curves
+
+typedef struct verify_curve {
+    int n, capacity_x, capacity_y;
+    double *x, *y; // owned, abscissa rising
+} verify_curve;
+
+static void curve_clear(verify_curve *curve) {
+    free(curve->x);
+    free(curve->y);
+    memset(curve, 0, sizeof *curve);
+}
+
+static void curve_add(verify_curve *curve, double x, double y) {
+    SILT_RESERVE(curve->x, curve->capacity_x, curve->n + 1);
+    SILT_RESERVE(curve->y, curve->capacity_y, curve->n + 1);
+    // kept rising; files are nearly always sorted
+    int i = curve->n++;
+    for (; i > 0 && curve->x[i - 1] > x; i--) {
+        curve->x[i] = curve->x[i - 1];
+        curve->y[i] = curve->y[i - 1];
+    }
+    curve->x[i] = x;
+    curve->y[i] = y;
+}
+
+// ordinate at x, NaN outside and beside gaps
+static double curve_at(const verify_curve *curve, double x) {
+    if (curve->n == 0 || !(x >= curve->x[0] && x <= curve->x[curve->n - 1]))
+        return NAN;
+    int lo = 0, hi = curve->n - 1;
+    while (hi - lo > 1) {
+        int middle = (lo + hi) / 2;
+        *(curve->x[middle] <= x ? &lo : &hi) = middle;
+    }
+    if (x == curve->x[lo])
+        return curve->y[lo];
+    if (x == curve->x[hi])
+        return curve->y[hi];
+    return curve->y[lo] + (curve->y[hi] - curve->y[lo]) * (x - curve->x[lo]) / (curve->x[hi] - curve->x[lo]);
+}
+
+// the first abscissa where the curve has the ordinate y, NaN when it never has
+static double curve_reach(const verify_curve *curve, double y) {
+    for (int i = 0; i < curve->n; i++) {
+        if (curve->y[i] == y)
+            return curve->x[i];
+        if (i + 1 < curve->n && (curve->y[i] - y) * (curve->y[i + 1] - y) < 0)
+            return curve->x[i] + (curve->x[i + 1] - curve->x[i]) * (y - curve->y[i]) / (curve->y[i + 1] - curve->y[i]);
+    }
+    return NAN;
+}
+
+static bool inside(double x, const double window[2]) {
+    return x >= window[0] && x <= window[1];
+}
+
+// ---------------------------------------------------------------- one check
+
+static const char *plain_name(const char *path) {
+    return strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
+}
+
+// the files that a scene reads: the references of its checks, then the series of its inlets; NULL: none there
+static const char *verify_file(const silt_scene *scene, int i) {
+    return i < scene->n_check ? scene->check[i].reference : scene->fluid.inlet[i - scene->n_check].series.path;
+}
+
+// the copy of a file in OUT: its plain name, or one with a number when that name is taken
+static char *verify_copy_path(const silt_scene *scene, const char *out, int file) {
+    const char *path = verify_file(scene, file), *name = plain_name(path);
+    for (int i = 0; i < file; i++) {
+        const char *other = verify_file(scene, i);
+        if (other && strcmp(name, plain_name(other)) == 0 && strcmp(path, other) != 0)
+            return silt_text("%s/%d_%s", out, file, name);
+    }
+    return silt_text("%s/%s", out, name);
+}
+
+static void verify_note(silt_check_result *result, const char *format, ...) __attribute__((format(printf, 2, 3)));
+static void verify_note(silt_check_result *result, const char *format, ...) {
+    va_list list;
+    va_start(list, format);
+    vsnprintf(result->note, sizeof result->note, format, list);
+    va_end(list);
+}
+
+// the reference's rows that `where` picks
+static bool verify_read(const silt_scene *scene, const char *out, int check, verify_curve *curve,
+                        silt_check_result *result) {
+    const silt_check_def *def = &scene->check[check];
+    const char *wanted[3] = {def->x, def->y, def->where_column};
+    int column[3] = {-1, -1, -1};
+    silt_series series = {0};
+    silt_error err = {0};
+    char *copy = verify_copy_path(scene, out, check);
+    bool here = access(copy, R_OK) == 0;
+    silt_status status = silt_series_read(here ? NULL : scene->folder, here ? copy : def->reference, &series, &err);
+    free(copy);
+    if (status)
+        verify_note(result, "%.250s", err.text);
+    for (int k = 0; k < 3 && !status; k++) {
+        if (!wanted[k] && k == 2)
+            continue;
+        column[k] = wanted[k] ? silt_series_column(&series, wanted[k]) : -1;
+        if (column[k] >= 0)
+            continue;
+        verify_note(result, "%.150s has no column %.60s", def->reference, wanted[k] ? wanted[k] : "for x and y");
+        status = SILT_FAILED;
+    }
+    for (int i = 0; i < series.n_row && !status; i++) {
+        const double *row = series.value + (size_t)i * (size_t)series.n_column;
+        if (!isnan(row[column[0]]) && !isnan(row[column[1]]) && (column[2] < 0 || row[column[2]] == def->where_value))
+            curve_add(curve, row[column[0]], row[column[1]]);
+    }
+    silt_series_clear(&series);
+    return !status;
+}
+
+// difference of the history from the reference at the reference's abscissas
+static void verify_curve_check(const silt_scene *scene, const char *out, int check, verify_curve *history,
+                               silt_check_result *result) {
+    const silt_check_def *def = &scene->check[check];
+    verify_curve reference = {0};
+    if (!verify_read(scene, out, check, &reference, result))
+        goto done;
+    if (!isnan(def->align)) {
+        double here = curve_reach(history, def->align), there = curve_reach(&reference, def->align);
+        if (isnan(here) || isnan(there)) {
+            verify_note(result, "the %s never reaches %g, where both are to be aligned",
+                        isnan(here) ? "result" : "reference", def->align);
+            goto done;
+        }
+        for (int i = 0; i < history->n; i++)
+            history->x[i] += there - here;
+    }
+    double sum = 0, worst = 0, last = history->n ? history->x[history->n - 1] : -HUGE_VAL;
+    int n = 0, wanted = 0, late = 0;
+    for (int i = 0; i < reference.n; i++) {
+        double x = reference.x[i], r = reference.y[i];
+        if (!inside(x, def->window) || !inside(r, def->window_value))
+            continue;
+        wanted++;
+        late += x > last;
+        double h = curve_at(history, x);
+        if (isnan(h))
+            continue;
+        double scale = def->relative_to != 0 ? def->relative_to : r;
+        if (scale == 0) {
+            verify_note(result, "the reference is 0 at %g: give relative_to", x);
+            goto done;
+        }
+        double e = fabs((h - r) / scale);
+        sum += e * e;
+        n++;
+        if (n == 1 || e > worst) {
+            worst = e;
+            result->value = h;
+            result->reference = r;
+        }
+    }
+    if (n == 0)
+        verify_note(result, "no data: %d rows of the reference are in the window, the result has none there", wanted);
+    else if (late > 0 && isfinite(def->window[1]))
+        verify_note(result, "the result ends at %g, %d rows of the reference in the window come later", last, late);
+    else {
+        result->error = def->norm == NORM_MAX ? worst : sqrt(sum / n);
+        result->pass = result->error <= def->tolerance;
+        verify_note(result, n < wanted ? "%d of %d rows of the reference" : "%d rows of the reference", n, wanted);
+    }
+done:
+    curve_clear(&reference);
+}
+
+// mean over the abscissa by the trapezoidal rule
+static double scalar_mean(const verify_curve *c) {
+    double sum = 0;
+    for (int i = 1; i < c->n; i++)
+        sum += 0.5 * (c->y[i] + c->y[i - 1]) * (c->x[i] - c->x[i - 1]);
+    double length = c->x[c->n - 1] - c->x[0];
+    return length > 0 ? sum / length : c->y[0];
+}
+
+// mean distance of the upward crossings of the mean, NaN with fewer than two
+static double scalar_period(const verify_curve *c) {
+    double mean = scalar_mean(c), first = NAN, last = NAN;
+    int n = 0;
+    for (int i = 1; i < c->n; i++) {
+        double a = c->y[i - 1] - mean, b = c->y[i] - mean;
+        if (!(a < 0 && b >= 0))
+            continue;
+        last = c->x[i - 1] + (c->x[i] - c->x[i - 1]) * a / (a - b);
+        first = n++ ? first : last;
+    }
+    return n > 1 ? (last - first) / (n - 1) : NAN;
+}
+
+// least squares, NaN when all abscissas are equal
+static double scalar_slope(const verify_curve *c) {
+    double mx = 0, my = 0, xx = 0, xy = 0;
+    for (int i = 0; i < c->n; i++) {
+        mx += c->x[i] / c->n;
+        my += c->y[i] / c->n;
+    }
+    for (int i = 0; i < c->n; i++) {
+        xx += silt_square(c->x[i] - mx);
+        xy += (c->x[i] - mx) * (c->y[i] - my);
+    }
+    return xx > 0 ? xy / xx : NAN;
+}
+
+static double scalar_extreme(const verify_curve *c, double sign) {
+    double best = -HUGE_VAL;
+    for (int i = 0; i < c->n; i++)
+        best = silt_max(best, sign * c->y[i]);
+    return sign * best;
+}
+
+static double scalar_measure(const verify_curve *c, silt_scalar scalar) {
+    switch (scalar) {
+    case SCALAR_MAX:
+        return scalar_extreme(c, 1);
+    case SCALAR_MIN:
+        return scalar_extreme(c, -1);
+    case SCALAR_MEAN:
+        return scalar_mean(c);
+    case SCALAR_PERIOD:
+        return scalar_period(c);
+    case SCALAR_SLOPE:
+        return scalar_slope(c);
+    case SCALAR_LAST:
+    case SCALAR_NONE:
+        break;
+    }
+    return c->y[c->n - 1];
+}
+
+static void verify_scalar_check(const silt_check_def *def, const verify_curve *history, silt_check_result *result) {
+    verify_curve part = {0};
+    double last = history->n ? history->x[history->n - 1] : -HUGE_VAL;
+    for (int i = 0; i < history->n; i++)
+        if (inside(history->x[i], def->window) && inside(history->y[i], def->window_value))
+            curve_add(&part, history->x[i], history->y[i]);
+    if (part.n == 0) {
+        verify_note(result, "no data in the window");
+        goto done;
+    }
+    double start = isfinite(def->window[0]) ? def->window[0] : 0;
+    if (isfinite(def->window[1]) && last < def->window[1] - VERIFY_SLACK * (def->window[1] - start)) {
+        verify_note(result, "the result ends at %g, before the window's end %g", last, def->window[1]);
+        goto done;
+    }
+    result->value = scalar_measure(&part, def->scalar);
+    if (isnan(result->value)) {
+        verify_note(result, "%s",
+                    def->scalar == SCALAR_PERIOD ? "fewer than two upward crossings of the mean in the window"
+                                                 : "fewer than two times in the window");
+        goto done;
+    }
+    if (!isnan(def->low) || !isnan(def->high)) {
+        // a range: the error is the distance to it
+        double low = isnan(def->low) ? -HUGE_VAL : def->low, high = isnan(def->high) ? HUGE_VAL : def->high;
+        result->reference = isfinite(low) && isfinite(high) ? 0.5 * (low + high) : isfinite(low) ? low : high;
+        result->error = silt_max(0, silt_max(low - result->value, result->value - high));
+        result->tolerance = 0;
+        verify_note(result, "allowed %g to %g", low, high);
+    } else {
+        result->reference = def->value;
+        result->error = fabs(result->value - def->value) / (def->value != 0 ? fabs(def->value) : 1);
+    }
+    result->pass = result->error <= result->tolerance;
+done:
+    curve_clear(&part);
+}
+
+// ---------------------------------------------------------------- all checks
+
+silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_check_result *result, silt_error *err) {
+    verify_history history = {0};
+    for (int i = 0; i < scene->n_check; i++) {
+        const silt_check_def *def = &scene->check[i];
+        result[i] = (silt_check_result){.name = def->name, .value = NAN, .reference = NAN, .error = NAN};
+        result[i].tolerance = def->tolerance;
+        verify_note(&result[i], "history.csv cannot be read");
+    }
+    silt_status status = scene->n_check > 0 ? history_read(&history, scene, out, err) : SILT_OK;
+    for (int i = 0; i < scene->n_check && !status; i++) {
+        const silt_check_def *def = &scene->check[i];
+        verify_note(&result[i], "history.csv has no column %.80s", def->column);
+        if (history.column[i] < 0)
+            continue;
+        result[i].note[0] = 0;
+        verify_curve curve = {0};
+        for (int k = 0; k < history.n_row; k++) {
+            // gauges are NaN where they measure nothing: gaps in the curve
+            double x = def->time_scale * (history.time[k] + def->time_shift);
+            if (isfinite(x))
+                curve_add(&curve, x, def->scale * (history.value[k * scene->n_check + i] + def->shift));
+        }
+        if (def->reference)
+            verify_curve_check(scene, out, i, &curve, &result[i]);
+        else
+            verify_scalar_check(def, &curve, &result[i]);
+        curve_clear(&curve);
+    }
+    history_clear(&history);
+    return status;
+}
+
+static silt_status verify_copy_file(const char *from, const char *to, silt_error *err) {
+    char block[1 << 14];
+    size_t n = 0;
+    FILE *source = fopen(from, "rb"), *target = source ? fopen(to, "wb") : NULL;
+    silt_status status = SILT_OK;
+    errno = source ? errno : ENOENT;
+    while (target && (n = fread(block, 1, sizeof block, source)) > 0 && fwrite(block, 1, n, target) == n)
+        continue;
+    if (!target || n > 0 || ferror(source) || fflush(target) != 0)
+        status = silt_fail(err, SILT_FAILED, "%s: cannot be copied to %s (%s)", from, to, strerror(errno));
+    if (source)
+        fclose(source);
+    if (target)
+        fclose(target);
+    return status;
+}
+
+// copies unless both are the same file: a scene may be run from its own output folder
+static silt_status verify_copy_one(const char *base, const char *path, const char *to, silt_error *err) {
+    char *from = *path == '/' || !base || !*base ? silt_text("%s", path) : silt_text("%s/%s", base, path);
+    char *real_from = realpath(from, NULL), *real_to = realpath(to, NULL);
+    silt_status status = SILT_OK;
+    if (!real_from || !real_to || strcmp(real_from, real_to) != 0)
+        status = verify_copy_file(from, to, err);
+    free(real_from);
+    free(real_to);
+    free(from);
+    return status;
+}
+
+// the resolved scene, where files are the copies: their rows come in the order of the checks and of the inlets
+static silt_status verify_scene(const silt_scene *scene, const char *out, silt_error *err) {
+    static const char *const row[2] = {"reference: ", "series: "};
+    const int end[2] = {scene->n_check, scene->n_check + scene->fluid.n_inlet};
+    int file[2] = {0, scene->n_check};
+    char *path = silt_text("%s/scene.yaml", out), *aside = silt_text("%s.part", path);
+    silt_status status = SILT_OK;
+    FILE *to = fopen(aside, "w");
+    for (const char *line = scene->resolved, *next; to && *line; line = next) {
+        next = strchr(line, '\n') ? strchr(line, '\n') + 1 : line + strlen(line);
+        const char *key = line + strspn(line, " -");
+        int kind = strncmp(key, row[0], strlen(row[0])) == 0 ? 0 : strncmp(key, row[1], strlen(row[1])) == 0 ? 1 : -1;
+        while (kind >= 0 && file[kind] < end[kind] && !verify_file(scene, file[kind]))
+            file[kind]++;
+        if (kind < 0 || file[kind] == end[kind]) {
+            fwrite(line, 1, (size_t)(next - line), to);
+            continue;
+        }
+        char *copy = verify_copy_path(scene, out, file[kind]++);
+        fprintf(to, "%.*s%s\"", (int)(key - line), line, row[kind]);
+        for (const char *c = plain_name(copy); *c; c++)
+            fprintf(to, *c == '"' || *c == '\\' ? "\\%c" : "%c", *c);
+        fputs("\"\n", to);
+        free(copy);
+    }
+    if (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0)
+        status = silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path, strerror(errno));
+    if (to)
+        fclose(to);
+    free(aside);
+    free(path);
+    return status;
+}
+
+silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err) {
+    silt_status status = SILT_OK;
+    for (int i = 0; i < scene->n_check + scene->fluid.n_inlet && !status; i++) {
+        if (!verify_file(scene, i))
+            continue;
+        char *to = verify_copy_path(scene, out, i);
+        status = verify_copy_one(scene->folder, verify_file(scene, i), to, err);
+        free(to);
+    }
+    return status ? status : verify_scene(scene, out, err);
+}
+
+static void verify_print(FILE *to, int width, double value) {
+    if (isnan(value))
+        fprintf(to, " %*s", width, "-");
+    else
+        fprintf(to, " %*.5g", width, value);
+}
+
+silt_status silt_verify(const char *out, FILE *to, silt_error *err) {
+    char *path = silt_text("%s/scene.yaml", out);
+    silt_scene *scene = NULL;
+    silt_check_result *result = NULL;
+    silt_status status = silt_scene_read(path, 0, NULL, &scene, err);
+    int failed = 0;
+    if (status)
+        goto done;
+    result = silt_alloc((size_t)scene->n_check + 1, sizeof *result);
+    status = silt_check_measure(scene, out, result, err);
+    if (status)
+        goto done;
+    if (scene->n_check == 0)
+        fprintf(to, "the scene has no checks\n");
+    else
+        fprintf(to, "%-24s %14s %14s %11s %11s\n", "check", "value", "reference", "error", "tolerance");
+    for (int i = 0; i < scene->n_check; i++) {
+        const silt_check_result *r = &result[i];
+        fprintf(to, "%-24s", r->name);
+        verify_print(to, 14, r->value);
+        verify_print(to, 14, r->reference);
+        verify_print(to, 11, r->error);
+        verify_print(to, 11, r->tolerance);
+        fprintf(to, "  %s%s%s%s\n", r->pass ? "pass" : "FAIL", *r->note ? " (" : "", r->note, *r->note ? ")" : "");
+        failed += !r->pass;
+    }
+    if (failed)
+        status = silt_fail(err, SILT_FAILED, "%s: %d of %d checks failed", out, failed, scene->n_check);
+done:
+    free(result);
+    silt_scene_free(&scene);
+    free(path);
+    return status;
+}

@@ -1,0 +1,625 @@
+// the scene: right ones, wrong ones, broken ones; the resolved text; series, regions, formulas; the shop floor of
+// base.h
+#include "output.h"
+#include "scene_keys.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <setjmp.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static char folder[4096]; // temporary
+
+static const char *place(const char *name) {
+    static char path[8][4200];
+    static int i;
+    i = (i + 1) % 8;
+    snprintf(path[i], sizeof path[i], "%s/%s", folder, name);
+    return path[i];
+}
+
+static const char *make(const char *name, const void *text, size_t size) {
+    const char *path = place(name);
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(text, 1, size, file), size);
+    fclose(file);
+    return path;
+}
+
+static const char *make_text(const char *name, const char *text) {
+    return make(name, text, strlen(text));
+}
+
+static char *slurp(const char *path, size_t *size) {
+    FILE *file = fopen(path, "rb");
+    if (!file)
+        fail_msg("%s: %s", path, strerror(errno));
+    char *text = silt_alloc(1 << 20, 1);
+    *size = fread(text, 1, (1 << 20) - 1, file);
+    fclose(file);
+    return text;
+}
+
+static silt_scene *right(const char *path, int n_set, const char *const *set) {
+    silt_error err = {0};
+    silt_scene *scene = NULL;
+    if (silt_scene_read(path, n_set, set, &scene, &err) != SILT_OK)
+        fail_msg("%s", err.text);
+    assert_non_null(scene);
+    return scene;
+}
+
+// a scene that must be refused with this in the message
+static void wrong(const char *path, int n_set, const char *const *set, int count, const char *part) {
+    silt_error err = {0};
+    silt_scene *scene = (silt_scene *)&err;
+    assert_int_equal(silt_scene_read(path, n_set, set, &scene, &err), SILT_INPUT);
+    assert_null(scene);
+    assert_int_equal(err.status, SILT_INPUT);
+    if (!strstr(err.text, part))
+        fail_msg("not in the message: %s\n%s", part, err.text);
+    if (count && err.count != count)
+        fail_msg("%d errors, not %d:\n%s", err.count, count, err.text);
+}
+
+#define HEAD  "silt: 1\ntime: {end: 1, output: 0.1}\ngravity: [0, -9.81]\n"
+#define WATER "fluid: {density: 1000, viscosity: 0.001, size: 0.1, regions: [{box: [[0, 0], [1, 1]]}]}\n"
+#define RIGHT SILT_SOURCE "/tests/right/"
+#define WRONG SILT_SOURCE "/tests/wrong/"
+
+// wrong scenes -----------------------------------------------------------------------------------------
+// the first line says which errors, all of them: "# expect: 4:12 fluid.density, 5:1 syntax"
+static void test_wrong(void **state) {
+    (void)state;
+    DIR *dir = opendir(WRONG);
+    assert_non_null(dir);
+    int n_file = 0;
+    for (struct dirent *entry; (entry = readdir(dir));) {
+        size_t length = strlen(entry->d_name), size;
+        if (length < 5 || strcmp(entry->d_name + length - 5, ".yaml") != 0)
+            continue;
+        char path[4200], line[1024] = "";
+        snprintf(path, sizeof path, WRONG "%s", entry->d_name);
+        char *text = slurp(path, &size);
+        sscanf(text, "# expect: %1023[^\n]", line);
+        free(text);
+        int count = 0;
+        bool other = false; // no word about what is allowed
+        for (char *rest = line, *part; (part = strtok_r(rest, ",", &rest));) {
+            char position[64], key[128], wanted[4600];
+            assert_int_equal(sscanf(part, " %63s %127s", position, key), 2);
+            bool bare = strcmp(key, "syntax") == 0;
+            snprintf(wanted, sizeof wanted, bare ? "%s:%s: %s" : "%s:%s: key '%s': found ", path, position, key);
+            wrong(path, 0, NULL, 0, wanted);
+            other |= bare || strstr(entry->d_name, "unknown") || strcmp(entry->d_name, "several.yaml") == 0;
+            count++;
+        }
+        if (count == 0)
+            fail_msg("%s: says not what it expects", path);
+        // that many and no more; each shows its line with a caret
+        wrong(path, 0, NULL, count, "\n    ");
+        if (!other)
+            wrong(path, 0, NULL, count, "allowed");
+        n_file++;
+    }
+    closedir(dir);
+    assert_true(n_file >= 100);
+}
+
+static void test_broken_files(void **state) {
+    (void)state;
+    const char *path = make_text("empty.yaml", "");
+    wrong(path, 0, NULL, 1, "empty.yaml:1:1: key 'silt': found an empty file, allowed");
+    wrong(place("nowhere.yaml"), 0, NULL, 1, "nowhere.yaml:1:1: cannot be opened: No such file");
+    wrong(folder, 0, NULL, 1, ":1:1: found a folder, allowed a YAML file");
+    path = make("binary.yaml", "silt: 1\nti\0tle: x\n", 18);
+    wrong(path, 0, NULL, 1, "binary.yaml:2:3: found a zero byte (a binary file?), allowed YAML text");
+    path = make_text("latin.yaml", "silt: 1\ntitle: \xe4\n");
+    wrong(path, 0, NULL, 1, "latin.yaml:2:8: found a byte that is not UTF-8");
+
+    // too large
+    size_t size = (8 << 20) + 1;
+    char *text = silt_alloc(size, 1);
+    memset(text, '#', size);
+    wrong(make("huge.yaml", text, size), 0, NULL, 1, "huge.yaml:1:1: found more than 8 MB, allowed at most that");
+
+    // too deep, in three ways
+    memset(text, '[', 65);
+    memset(text + 65, ']', 65);
+    wrong(make("deep.yaml", text, 130), 0, NULL, 1, "deep.yaml:1:65: syntax: found more than 64 levels");
+    memset(text, '[', 1 << 20);
+    wrong(make("deeper.yaml", text, 1 << 20), 0, NULL, 1, "deeper.yaml:1:");
+    size_t at = 0;
+    for (int i = 0; i < 200; i++)
+        at += (size_t)snprintf(text + at, size - at, "%*sa:\n", i, "");
+    wrong(make("stairs.yaml", text, at), 0, NULL, 1, "levels, allowed at most that");
+
+    // aliases of aliases: a billion values from a kilobyte
+    at = (size_t)snprintf(text, size, "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n");
+    for (int i = 1; i < 10; i++) {
+        at += (size_t)snprintf(text + at, size - at, "a%d: &a%d [", i, i);
+        for (int k = 0; k < 10; k++)
+            at += (size_t)snprintf(text + at, size - at, "%s*a%d", k ? ", " : "", i - 1);
+        at += (size_t)snprintf(text + at, size - at, "]\n");
+    }
+    wrong(make("bomb.yaml", text, at), 0, NULL, 1, "syntax: found more than 1000000 values, allowed at most that");
+    // many values in the plain
+    text[0] = '[';
+    for (at = 1; at < 4000000; at += 2)
+        memcpy(text + at, "1,", 2);
+    wrong(make("flood.yaml", text, at), 0, NULL, 1, "syntax: found more than 1000000 values, allowed at most that");
+    free(text);
+}
+
+// all errors at once, counted, as many shown as there is room for
+static void test_many_errors(void **state) {
+    (void)state;
+    char text[16384] = HEAD WATER "gauges:\n";
+    for (int i = 0; i < 70; i++)
+        snprintf(text + strlen(text), sizeof text - strlen(text), "  - {name: g%d, hight_at: 1}\n", i);
+    silt_error err = {0};
+    silt_scene *scene = NULL;
+    const char *path = make_text("many.yaml", text);
+    assert_int_equal(silt_scene_read(path, 0, NULL, &scene, &err), SILT_INPUT);
+    assert_int_equal(err.count, 70);
+    assert_non_null(strstr(err.text,
+                           "many.yaml:6:16: key 'gauges.0.hight_at': found no such key, did you mean 'height_at'?\n"
+                           "      - {name: g0, hight_at: 1}\n"
+                           "                   ^\n"));
+    int shown = 0, left = 0;
+    for (const char *c = err.text; (c = strstr(c, "did you mean")); c++)
+        shown++;
+    assert_int_equal(sscanf(strstr(err.text, "\n... and "), "\n... and %d more errors", &left), 1);
+    assert_int_equal(shown + left, 70);
+    assert_true(shown >= 10 && strlen(err.text) < sizeof err.text);
+    // without a place for the message, and freeing nothing
+    assert_int_equal(silt_scene_read(path, 0, NULL, &scene, NULL), SILT_INPUT);
+    silt_scene_free(&scene);
+    silt_scene_free(NULL);
+}
+
+// right scenes -----------------------------------------------------------------------------------------
+static void test_whole(void **state) {
+    (void)state;
+    silt_scene *s = right(RIGHT "whole.yaml", 0, NULL);
+    assert_string_equal(s->title, "Everything: \"all\" at once, \303\251 and \t too");
+    assert_int_equal(s->version, 1);
+    assert_int_equal(s->dimension, 2);
+    assert_true(s->time.end == 4 && s->time.output == 0.02 && s->time.step == 0.01 && s->time.cfl == 0.5);
+    assert_true(s->time.checkpoint == 0 && s->time.steps == 1000000 && s->time.retries == 8);
+    assert_true(s->gravity[0] == 0 && s->gravity[1] == -9.81 && s->gravity[2] == 0);
+    const silt_fluid_def *f = &s->fluid;
+    assert_true(f->on && f->density == 1000 && f->viscosity == 0.001 && f->size == 0.02);
+    assert_true(f->scheme == SCHEME_FRACTIONAL && f->pressure == PRESSURE_CONSISTENT && f->theta == 1);
+    assert_true(f->alpha == 1.3 && f->merge == 0.25 && f->tolerance == 1e-6 && f->iterations == 12);
+    assert_true(f->volume_control && f->volume_steps == 15 && f->jitter == 0 && f->seed == 1);
+    assert_int_equal(f->n_region, 3);
+    assert_int_equal(f->region[0].kind, REGION_BOX);
+    assert_true(f->region[0].hi[0] == 1 && f->region[0].hi[1] == 1);
+    // given clockwise: turned over, the first corner stays
+    assert_int_equal(f->region[1].kind, REGION_POLYGON);
+    const double turned[12] = {2, 0, 0, 3, 0, 0, 3, 0.5, 0, 2, 0.5, 0};
+    assert_memory_equal(f->region[1].point, turned, sizeof turned);
+    assert_true(f->region[2].kind == REGION_CIRCLE && f->region[2].centre[0] == 4 && f->region[2].radius == 0.2);
+    assert_true(f->n_inlet == 1 && f->n_outlet == 1 && f->inlet[0].velocity[0] == 1 && f->inlet[0].from[1] == 1);
+    assert_true(f->inlet[0].series.n_row == 3 && silt_series_at(&f->inlet[0].series, 1, 2) == 0.75);
+    assert_string_equal(f->outlet[0].name, "out");
+    assert_true(f->velocity.kind == FORMULA_STANDING_WAVE && f->velocity.depth == 0.5 && f->velocity.centre[0] == 0);
+    assert_int_equal(s->n_wall, 3);
+    assert_true(!s->wall[0].closed && s->wall[0].condition == WALL_SLIP && s->wall[0].n_point == 3);
+    const double outline[12] = {-1, -1, 0, 7, -1, 0, 7, 3, 0, -1, 3, 0};
+    assert_true(s->wall[1].closed && s->wall[1].n_point == 4 && s->wall[1].condition == WALL_NO_SLIP);
+    assert_memory_equal(s->wall[1].point, outline, sizeof outline);
+    assert_true(s->wall[2].closed && s->wall[2].n_point == 3);
+    const silt_bed_def *b = &s->bed;
+    assert_true(b->on && b->density == 2650 && b->porosity == 0.4 && isinf(b->work) && b->law == BED_FRICTIONAL_WORK);
+    assert_true(b->distance == 0.02 && b->size == 0.02 && b->layer == 0.02 && b->threshold == 0 && b->saturation == 1);
+    assert_true(b->deposition && b->condition == WALL_NO_SLIP && b->n_region == 1);
+    assert_true(silt_region_area(&b->region[0]) == 0.5);
+    const silt_grains_def *g = &s->grains;
+    assert_true(g->on && g->drag == DRAG_DI_FELICE && g->parcel == 0.03 && g->diameter == 0.03 && g->width == 0);
+    assert_true(g->n_grain == 1 && g->grain[0].at[0] == 5 && g->grain[0].density == 2000);
+    assert_true(s->contact.on && s->contact.body_friction == 0.45 && s->contact.step == 0.15);
+    assert_int_equal(s->n_body, 4);
+    assert_true(s->body[0].shape == SHAPE_TEMPLE && s->body[0].scale == 0.4 && s->body[0].motion == MOTION_FREE);
+    assert_true(s->body[1].shape == SHAPE_BOX && s->body[1].height == 0.2 && s->body[1].angle == 30);
+    assert_true(s->body[1].motion == MOTION_FIXED && s->body[3].shape == SHAPE_DISC);
+    assert_true(s->body[2].n_point == 3 && silt_polygon_area(3, s->body[2].point) == 0.5);
+    static const silt_gauge_kind kind[9] = {GAUGE_HEIGHT,   GAUGE_WETTED,    GAUGE_PRESSURE,
+                                            GAUGE_VELOCITY, GAUGE_DISCHARGE, GAUGE_BED_LEVEL,
+                                            GAUGE_SCOUR,    GAUGE_FRONT,     GAUGE_FRONT};
+    assert_int_equal(s->n_gauge, 9);
+    for (int i = 0; i < 9; i++)
+        assert_int_equal(s->gauge[i].kind, kind[i]);
+    assert_true(s->gauge[0].from[0] == 2 && s->gauge[4].to[1] == 2 && s->gauge[7].from[0] == 1 &&
+                s->gauge[8].from[0] == -1);
+    assert_int_equal(s->n_check, 3);
+    const silt_check_def *c = s->check;
+    assert_string_equal(c[0].column, "front");
+    assert_string_equal(c[0].x, "t");
+    assert_string_equal(c[0].y, "x");
+    assert_string_equal(c[0].where_column, "run");
+    assert_true(c[0].where_value == 2 && c[0].norm == NORM_MAX && c[0].tolerance == 0.05 && isnan(c[0].align));
+    assert_true(c[0].time_scale == 1 && c[0].scale == 1 && isinf(c[0].window[0]) && isinf(c[0].window_value[1]));
+    assert_true(c[0].reference[0] == '/' && isnan(c[0].low) && isnan(c[0].value) && c[0].scalar == SCALAR_NONE);
+    assert_true(c[1].scalar == SCALAR_MAX && c[1].low == 0 && isinf(c[1].high) && c[1].window[1] == 2 &&
+                !c[1].reference);
+    assert_true(c[2].value == 0 && c[2].tolerance == 0.001 && isnan(c[2].low));
+    assert_true(silt_scene_has_dem(s));
+    silt_scene_free(&s);
+    assert_null(s);
+
+    s = right(RIGHT "dry.yaml", 0, NULL);
+    assert_true(!s->fluid.on && !s->bed.on && !s->grains.on && s->contact.on && s->n_wall == 0 &&
+                silt_scene_has_dem(s));
+    silt_scene_free(&s);
+}
+
+// all numbers of two scenes are the same bits
+static void same_scene(const silt_scene *a, const silt_scene *b) {
+    assert_string_equal(a->resolved, b->resolved);
+    assert_true(a->hash == b->hash);
+    assert_memory_equal(&a->time, &b->time, sizeof a->time);
+    assert_memory_equal(a->gravity, b->gravity, sizeof a->gravity);
+    assert_memory_equal(&a->contact, &b->contact, sizeof a->contact);
+    assert_memory_equal(&a->fluid, &b->fluid, offsetof(silt_fluid_def, n_region));
+    assert_memory_equal(&a->fluid.velocity, &b->fluid.velocity, sizeof a->fluid.velocity);
+    assert_memory_equal(&a->bed, &b->bed, offsetof(silt_bed_def, n_region));
+    assert_memory_equal(&a->grains, &b->grains, offsetof(silt_grains_def, n_grain));
+    assert_int_equal(a->fluid.n_region, b->fluid.n_region);
+    for (int i = 0; i < a->fluid.n_region; i++) {
+        const silt_region *p = &a->fluid.region[i], *q = &b->fluid.region[i];
+        assert_memory_equal(p->lo, q->lo, sizeof p->lo + sizeof p->hi);
+        assert_true(p->kind == q->kind && p->n_point == q->n_point && p->radius == q->radius);
+        if (p->n_point)
+            assert_memory_equal(p->point, q->point, (size_t)p->n_point * 24);
+    }
+    assert_int_equal(a->n_wall, b->n_wall);
+    for (int i = 0; i < a->n_wall; i++) {
+        assert_true(a->wall[i].n_point == b->wall[i].n_point && a->wall[i].closed == b->wall[i].closed &&
+                    a->wall[i].condition == b->wall[i].condition);
+        assert_memory_equal(a->wall[i].point, b->wall[i].point, (size_t)a->wall[i].n_point * 24);
+    }
+    assert_int_equal(a->grains.n_grain, b->grains.n_grain);
+    if (a->grains.n_grain)
+        assert_memory_equal(a->grains.grain, b->grains.grain, (size_t)a->grains.n_grain * sizeof *a->grains.grain);
+    assert_int_equal(a->n_body, b->n_body);
+    for (int i = 0; i < a->n_body; i++) {
+        assert_string_equal(a->body[i].name, b->body[i].name);
+        assert_memory_equal(a->body[i].at, b->body[i].at, 10 * sizeof(double));
+    }
+    assert_true(a->n_gauge == b->n_gauge && a->n_check == b->n_check);
+    for (int i = 0; i < a->n_gauge; i++)
+        assert_true(a->gauge[i].kind == b->gauge[i].kind && memcmp(a->gauge[i].from, b->gauge[i].from, 48) == 0);
+    for (int i = 0; i < a->n_check; i++)
+        assert_memory_equal(&a->check[i].where_value, &b->check[i].where_value,
+                            offsetof(silt_check_def, relative_to) - offsetof(silt_check_def, where_value));
+}
+
+static void test_resolved(void **state) {
+    (void)state;
+    static const char *const file[] = {RIGHT "whole.yaml", RIGHT "dry.yaml", RIGHT "plain.yaml", RIGHT "plain.json"};
+    for (int i = 0; i < 4; i++) {
+        const char *set[] = {"time.end=0.1", "gravity=[0.1, -9.80665]", "title='a: #b'"};
+        silt_scene *a = right(file[i], i % 2 ? 3 : 0, set);
+        silt_scene *b = right(make_text("resolved.yaml", a->resolved), 0, NULL);
+        same_scene(a, b);
+        silt_scene_free(&a);
+        silt_scene_free(&b);
+    }
+    // the same scene in other words
+    silt_scene *yaml = right(RIGHT "plain.yaml", 0, NULL), *json = right(RIGHT "plain.json", 0, NULL);
+    same_scene(yaml, json);
+    silt_scene *other = right(RIGHT "plain.yaml", 1, (const char *[]){"fluid.seed=2"});
+    assert_true(other->hash != yaml->hash);
+    silt_scene_free(&yaml);
+    silt_scene_free(&json);
+    silt_scene_free(&other);
+    // numbers come back to the bit, texts to the letter
+    static const double number[] = {0.1, 1.0 / 3, 5e-324, 1.7976931348623157e308, 123456789012345678.0, 2.5e-9};
+    for (int i = 0; i < 6; i++) {
+        char set[64];
+        snprintf(set, sizeof set, "fluid.density=%.17g", number[i]);
+        silt_scene *a =
+            right(RIGHT "plain.yaml", 2, (const char *[]){set, "title=\"\\u2028\\U0001f30a \\\\ \\\" \\x85 \\n\""});
+        silt_scene *b = right(make_text("resolved.yaml", a->resolved), 0, NULL);
+        assert_true(a->fluid.density == number[i] && b->fluid.density == number[i]);
+        assert_string_equal(a->title, "\xe2\x80\xa8\xf0\x9f\x8c\x8a \\ \" \xc2\x85 \n");
+        same_scene(a, b);
+        silt_scene_free(&a);
+        silt_scene_free(&b);
+    }
+}
+
+// a resolved scene outlives its files when copies lie beside it
+static void test_moved(void **state) {
+    (void)state;
+    assert_int_equal(mkdir(place("one"), 0777), 0);
+    assert_int_equal(mkdir(place("two"), 0777), 0);
+    make_text("one/a.csv", "t,x\n0,1\n");
+    make_text("one/scene.yaml", HEAD WATER "checks: [{name: c, column: time, reference: a.csv, tolerance: 1}]\n");
+    silt_scene *s = right(place("one/scene.yaml"), 0, NULL);
+    make_text("two/scene.yaml", s->resolved);
+    assert_int_equal(rename(place("one/a.csv"), place("two/a.csv")), 0);
+    silt_scene *t = right(place("two/scene.yaml"), 0, NULL);
+    assert_string_equal(t->check[0].reference, place("two/a.csv"));
+    assert_true(s->hash == t->hash);
+    silt_scene_free(&t);
+    assert_int_equal(rename(place("two/a.csv"), place("two/0_a.csv")), 0);
+    t = right(place("two/scene.yaml"), 0, NULL);
+    assert_string_equal(t->check[0].reference, place("two/0_a.csv"));
+    silt_scene_free(&t);
+    silt_scene_free(&s);
+}
+
+static void test_cases(void **state) {
+    (void)state;
+    DIR *dir = opendir(SILT_SOURCE "/cases");
+    for (struct dirent *entry; dir && (entry = readdir(dir));) {
+        char path[4200];
+        snprintf(path, sizeof path, SILT_SOURCE "/cases/%s/scene.yaml", entry->d_name);
+        if (entry->d_name[0] == '.' || access(path, R_OK) != 0)
+            continue;
+        silt_scene *s = right(path, 0, NULL);
+        silt_scene_free(&s);
+    }
+    if (dir)
+        closedir(dir);
+}
+
+// -D ---------------------------------------------------------------------------------------------------
+static void test_set(void **state) {
+    (void)state;
+    const char *set[] = {"fluid.size=0.01",
+                         "bodies.0.density=701",
+                         "bodies.cube.density=702",
+                         "gravity.1=-5",
+                         "time.cfl=0.25",
+                         "fluid.velocity={formula: uniform, vector: [1, 2]}",
+                         "title=a=b",
+                         "fluid.regions.0.box=[[0, 0], [0.5, 1]]",
+                         "checks.volume.tolerance=2e-3",
+                         "bed.size=0.005",
+                         "gauges=[{name: front, front: x}, {name: v1, velocity_at: [1, 1]}]"};
+    silt_scene *s = right(RIGHT "whole.yaml", 11, set);
+    assert_true(s->fluid.size == 0.01 && s->bed.distance == 0.01 && s->bed.size == 0.005);
+    assert_true(s->body[0].density == 701 && s->body[1].density == 702 && s->body[2].density == 700);
+    assert_true(s->gravity[1] == -5 && s->time.cfl == 0.25 && s->fluid.velocity.kind == FORMULA_UNIFORM);
+    assert_true(s->fluid.velocity.vector[1] == 2 && s->fluid.region[0].hi[0] == 0.5 && s->check[2].tolerance == 2e-3);
+    assert_string_equal(s->title, "a=b");
+    assert_int_equal(s->n_gauge, 2);
+    silt_scene_free(&s);
+
+    // blocks that are not there yet are made; the last of two counts
+    const char *path = make_text("bare.yaml", HEAD "fluid:\n");
+    const char *block[] = {"fluid.density=1",
+                           "fluid.viscosity=0",
+                           "fluid.size=1",
+                           "fluid.regions=[{circle: [0, 0], radius: 1}]",
+                           "fluid.velocity.formula=shear",
+                           "fluid.velocity.rate=3",
+                           "fluid.velocity.rate=4"};
+    s = right(path, 7, block);
+    assert_true(s->fluid.velocity.kind == FORMULA_SHEAR && s->fluid.velocity.rate == 4);
+    silt_scene_free(&s);
+
+    // errors name the text and the place in it
+    static const char *const bad[][2] = {
+        {"fluid.size=-1",
+         "-D fluid.size=-1:1:12: key 'fluid.size': found '-1', allowed a number in m, > 0\n    fluid.size=-1\n"
+         "               ^"},
+        {"fluid.szie=1", "-D fluid.szie=1:1:7: key 'fluid.szie': found no such key, did you mean 'size'?"},
+        {"gravity=[0, x]", "-D gravity=[0, x]:1:13: key 'gravity': found 'x', allowed a number in m/s2"},
+        {"bodies.4.density=1",
+         "-D bodies.4.density=1:1:8: key 'bodies.4': found no item '4', allowed 0 to 3, or the name"},
+        {"bodies.rome.density=1", "-D bodies.rome.density=1:1:8: key 'bodies.rome': found no item 'rome'"},
+        {"fluid.size.x=1", "-D fluid.size.x=1:1:12: key 'fluid.size.x': found no item 'x', allowed nothing below"},
+        {"fluid.size=", "-D fluid.size=:1:12: key 'fluid.size': found no value, allowed a YAML value"},
+        {"fluid.size", "-D fluid.size:1:1: found no path=value, allowed for example"},
+        {"=1", "-D =1:1:1: found no path=value"},
+        {"fluid..size=1", "-D fluid..size=1:1:7: key 'fluid.': found no item '', allowed a name between the dots"},
+        {"gravity=[0, 1", "-D gravity=[0, 1:1:14: syntax: flow sequence without a closing bracket"},
+        {"fluid.regions.1.polygon=[[0, 0], [1, 0], [2, 0]]",
+         ":1:25: key 'fluid.regions.1.polygon': found a polygon without"},
+        {"title=\xff", ":1:1: found no path=value"},
+        {"dimension=3",
+         "-D dimension=3:1:11: key 'dimension': found 3, allowed 2: three dimensions are not there yet"}};
+    for (int i = 0; i < (int)(sizeof bad / sizeof *bad); i++)
+        wrong(RIGHT "whole.yaml", 1, bad[i], 1, bad[i][1]);
+    wrong(RIGHT "whole.yaml", 2, (const char *[]){"time.end=x", "fluid.size=y"}, 2,
+          "-D fluid.size=y:1:12: key 'fluid.size'");
+}
+
+// words ------------------------------------------------------------------------------------------------
+static void test_words(void **state) {
+    (void)state;
+    assert_int_equal(silt_text_distance("density", "density", 3), 0);
+    assert_int_equal(silt_text_distance("densty", "density", 3), 1);
+    assert_int_equal(silt_text_distance("dnesity", "density", 3), 1);
+    assert_int_equal(silt_text_distance("kitten", "sitting", 3), 3);
+    assert_int_equal(silt_text_distance("kitten", "sitting", 2), 3);
+    assert_int_equal(silt_text_distance("", "abc", 5), 3);
+    assert_string_equal(silt_key_nearest(&silt_scene_keys, "fluids"), "fluid");
+    assert_string_equal(silt_key_nearest(&silt_scene_keys, "Gravty"), "gravity");
+    assert_null(silt_key_nearest(&silt_scene_keys, "colour"));
+    static const char *const no[] = {"",      "-",   ".",   "e5", "1e",  "1e+",   "0x1",
+                                     "1_000", "inf", "nan", "1 ", "--1", "1.2.3", "-.nan"};
+    double x;
+    for (int i = 0; i < (int)(sizeof no / sizeof *no); i++)
+        if (silt_text_number(no[i], &x))
+            fail_msg("'%s' is no number", no[i]);
+    assert_true(silt_text_number("-.5e+1", &x) && x == -5);
+    assert_true(silt_text_number("+3.", &x) && x == 3);
+    assert_true(silt_text_number("-.inf", &x) && x == -HUGE_VAL);
+    assert_true(silt_text_number(".nan", &x) && isnan(x));
+}
+
+// the table itself: no name twice, defaults that are allowed, words for all
+static void table_sound(const silt_key_table *table) {
+    for (const silt_key *key = table->key; key->name; key++) {
+        assert_ptr_equal(silt_key_find(table, key->name), key);
+        if (!*key->doc || (key->kind == KEY_BLOCK || key->kind == KEY_LIST) != (key->sub != NULL))
+            fail_msg("%s is not whole", key->name);
+        double x;
+        if (key->kind == KEY_NUMBER && key->fallback && silt_text_number(key->fallback, &x) && !isnan(x) &&
+            (key->low != 0 || key->high != 0) && (x < key->low || x > key->high))
+            fail_msg("%s: its default is not allowed", key->name);
+        if (key->sub)
+            table_sound(key->sub);
+    }
+}
+
+static void test_help(void **state) {
+    (void)state;
+    silt_error err = {0};
+    table_sound(&silt_scene_keys);
+    char *text = NULL;
+    size_t size = 0;
+    FILE *to = open_memstream(&text, &size);
+    assert_int_equal(silt_scene_help("fluid.size", to, &err), SILT_OK);
+    fclose(to);
+    assert_string_equal(text, "fluid.size\n  type     number\n  unit     m\n  default  required\n  allowed  > 0\n"
+                              "  meaning  distance h between nodes\n");
+    free(text);
+    to = open_memstream(&text, &size);
+    assert_int_equal(silt_scene_help(NULL, to, &err), SILT_OK);
+    assert_int_equal(silt_scene_help("bodies.0.height", to, &err), SILT_OK);
+    assert_int_equal(silt_scene_help("walls", to, &err), SILT_OK);
+    fclose(to);
+    assert_non_null(strstr(text, "of a box; 0: as wide as high; only with shape: box"));
+    assert_non_null(strstr(text, "the last point is joined to the first\n"));
+    free(text);
+    to = open_memstream(&text, &size);
+    assert_int_equal(silt_scene_help("fluid.densty", to, &err), SILT_INPUT);
+    fclose(to);
+    assert_string_equal(err.text,
+                        "help: found no key 'fluid.densty', did you mean 'density'?, allowed: one of the keys that "
+                        "`silt help` lists");
+    assert_int_equal(size, 0);
+    free(text);
+}
+
+// `test_scene document > docs/scene.md` makes it anew
+static void test_document(void **state) {
+    (void)state;
+    char *text = NULL;
+    size_t size = 0, old_size;
+    FILE *to = open_memstream(&text, &size);
+    silt_scene_document(to);
+    fclose(to);
+    char *old = slurp(SILT_SOURCE "/docs/scene.md", &old_size);
+    assert_string_equal(old, text);
+    free(old);
+    free(text);
+}
+
+// the checks' columns are those of history.csv
+static void test_columns(void **state) {
+    (void)state;
+    silt_scene *s = right(RIGHT "whole.yaml", 0, NULL);
+    silt_error err = {0};
+    silt_history *history = NULL;
+    assert_int_equal(silt_history_create(&history, folder, s, &err), SILT_OK);
+    assert_int_equal(silt_history_close(&history, &err), SILT_OK);
+    size_t size;
+    char *text = slurp(place("history.csv"), &size), *rest = text;
+    text[strcspn(text, "\n")] = 0;
+    int n = 0;
+    for (char *name; (name = strsep(&rest, ",")); n++) {
+        char set[200];
+        snprintf(set, sizeof set, "checks=[{name: c, column: %s, scalar: last, value: 1, tolerance: 1}]", name);
+        silt_scene *t = right(RIGHT "whole.yaml", 1, (const char *[]){set});
+        silt_scene_free(&t);
+    }
+    assert_true(n > 100);
+    free(text);
+    silt_scene_free(&s);
+}
+
+// random damage: read or refused, and what is read must survive its own resolved text
+static void test_damage(void **state) {
+    (void)state;
+    size_t size;
+    char *good = slurp(RIGHT "whole.yaml", &size), *text = silt_alloc(2 * size, 1);
+    make_text("hydrograph.csv", "time,factor\n0,0\n1,1\n");
+    make_text("curve.csv", "t,x,run\n0,1,1\n");
+    static const char token[] = "{}[],:&*!|>'\"%@`#-? \n\t\\.0123456789einfanx~<=\x80\xff\xc3\xa9";
+    uint64_t seed = 2024;
+    int n_right = 0, n_wrong = 0, rounds = 4000;
+    for (int round = 0; round < rounds; round++) {
+        size_t n = size;
+        memcpy(text, good, size);
+        int edits = 1 + (int)(silt_random(&seed) % 3);
+        for (int i = 0; i < edits; i++) {
+            size_t at = silt_random(&seed) % n, length = silt_random(&seed) % 12;
+            switch (silt_random(&seed) % 4) {
+            case 0: // another letter
+                text[at] = token[silt_random(&seed) % (sizeof token - 1)];
+                break;
+            case 1: // a letter more
+                memmove(text + at + 1, text + at, n - at);
+                text[at] = token[silt_random(&seed) % (sizeof token - 1)];
+                n++;
+                break;
+            case 2: // letters less
+                length = length < n - at ? length : n - at;
+                memmove(text + at, text + at + length, n - at - length);
+                n -= length;
+                break;
+            default: { // letters from elsewhere
+                size_t from = silt_random(&seed) % n, most = n - (at > from ? at : from);
+                memmove(text + at, text + from, length < most ? length : most);
+            }
+            }
+        }
+        silt_error err = {0};
+        silt_scene *scene = NULL, *again = NULL;
+        // -D gets its share of the damage
+        char set[32] = {0};
+        memcpy(set, text + silt_random(&seed) % (n - 31), 31);
+        const char *path = make("damage.yaml", text, n), *one = set;
+        silt_status status = silt_scene_read(path, round % 8 == 0, &one, &scene, &err);
+        if (status == SILT_OK) {
+            n_right++;
+            again = right(make_text("again.yaml", scene->resolved), 0, NULL);
+            assert_string_equal(scene->resolved, again->resolved);
+            assert_true(scene->hash == again->hash);
+        } else {
+            n_wrong++;
+            assert_int_equal(status, SILT_INPUT);
+            assert_true(err.count > 0 && err.text[0]);
+        }
+        silt_scene_free(&scene);
+        silt_scene_free(&again);
+    }
+    // both happen often
+    if (n_right < rounds / 50 || n_wrong < rounds / 2)
+        fail_msg("%d right and %d wrong of %d", n_right, n_wrong, rounds);
+    free(good);
+    free(text);
+}
+
+int main(int argc, char **argv) {
+    if (argc > 1 && strcmp(argv[1], "document") == 0) {
+        silt_scene_document(stdout);
+        return 0;
+    }
+    snprintf(folder, sizeof folder, "%s/test_scene_XXXXXX", SILT_BINARY);
+    if (!mkdtemp(folder))
+        return 1;
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_words),       cmocka_unit_test(test_help),     cmocka_unit_test(test_document),
+        cmocka_unit_test(test_whole),       cmocka_unit_test(test_resolved), cmocka_unit_test(test_moved),
+        cmocka_unit_test(test_set),         cmocka_unit_test(test_wrong),    cmocka_unit_test(test_broken_files),
+        cmocka_unit_test(test_many_errors), cmocka_unit_test(test_columns),  cmocka_unit_test(test_cases),
+        cmocka_unit_test(test_damage),
+    };
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    char command[4300];
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    return system(command) != 0 || failed ? 1 : 0;
+}

@@ -1,0 +1,260 @@
+// checks held against hand-made histories, and what verify, summary and info make of them
+
+#include "output_folder.h"
+
+// ---------------------------------------------------------------- checks
+
+// a history of 2001 steps over 10 s
+static void checks_history(void) {
+    FILE *to = fopen(place("history.csv"), "w");
+    fputs("step,time,wave,external_work,front,gap,wall_output\n", to);
+    for (int i = 0; i <= 2000; i++) {
+        double t = 0.005 * i;
+        fprintf(to, "%d,%.17g,%.17g,%.17g,%.17g,%.17g,0\n", i, t, 3 + 0.5 * sin(2 * M_PI * t / 1.7 + 0.4), 4 - 2.5 * t,
+                t * t, t < 5 ? NAN : t);
+    }
+    fputs("2001,10.0", to);
+    fclose(to);
+}
+
+static silt_check_def check_of(const char *name, const char *column) {
+    return (silt_check_def){.name = (char *)(uintptr_t)name,
+                            .column = (char *)(uintptr_t)column,
+                            .time_scale = 1,
+                            .scale = 1,
+                            .align = NAN,
+                            .window = {-HUGE_VAL, HUGE_VAL},
+                            .window_value = {-HUGE_VAL, HUGE_VAL},
+                            .norm = NORM_L2,
+                            .low = NAN,
+                            .high = NAN,
+                            .tolerance = 1e-3};
+}
+
+static silt_check_result measure(silt_check_def *def) {
+    silt_scene scene = {.n_check = 1, .check = def, .folder = folder};
+    silt_check_result result = {0};
+    silt_error err = {0};
+    assert_int_equal(silt_check_measure(&scene, folder, &result, &err), SILT_OK);
+    return result;
+}
+
+static silt_check_result scalar(const char *column, silt_scalar kind, double low, double high, double value) {
+    silt_check_def def = check_of("scalar", column);
+    def.scalar = kind;
+    def.window[0] = low;
+    def.window[1] = high;
+    def.value = value;
+    return measure(&def);
+}
+
+static void test_checks_scalar(void **state) {
+    (void)state;
+    checks_history();
+    silt_check_result r = scalar("wave", SCALAR_PERIOD, 0, 10, 1.7);
+    assert_true(r.pass);
+    near(r.value, 1.7, 1e-3 * 1.7);
+    near(scalar("wave", SCALAR_PERIOD, 2, 8, 1.7).value, 1.7, 1e-3 * 1.7);
+    near(scalar("external_work", SCALAR_SLOPE, 1, 9, -2.5).value, -2.5, 1e-12);
+    near(scalar("wave", SCALAR_MAX, 0, 10, 3.5).value, 3.5, 1e-4);
+    near(scalar("wave", SCALAR_MIN, 0, 10, 2.5).value, 2.5, 1e-4);
+    near(scalar("external_work", SCALAR_LAST, -HUGE_VAL, HUGE_VAL, -21).value, -21, 1e-12);
+    near(scalar("external_work", SCALAR_LAST, 0, 2, -1).value, -1, 1e-12);
+    near(scalar("front", SCALAR_MEAN, 0, 3, 3).value, 3, 1e-4);
+    near(scalar("gap", SCALAR_MIN, -HUGE_VAL, HUGE_VAL, 5).value, 5, 1e-12);
+
+    // relative to the value, absolute when that is 0
+    r = scalar("external_work", SCALAR_LAST, 0, 2, -1.25);
+    near(r.error, 0.2, 1e-12);
+    assert_false(r.pass);
+    near(scalar("external_work", SCALAR_LAST, 0, 2, 0).error, 1, 1e-12);
+
+    // a range
+    silt_check_def def = check_of("range", "external_work");
+    def.scalar = SCALAR_LAST;
+    def.low = -22;
+    def.high = -20;
+    r = measure(&def);
+    assert_true(r.pass);
+    def.low = -20;
+    def.high = NAN;
+    r = measure(&def);
+    near(r.error, 1, 1e-12);
+    assert_false(r.pass);
+
+    // scaled abscissa and ordinate: 2 (t + 1) and -3 (y + 5); only ordinates below 0
+    def = check_of("scaled", "external_work");
+    def.scalar = SCALAR_MAX;
+    def.time_scale = 2;
+    def.time_shift = 1;
+    def.scale = -3;
+    def.shift = 5;
+    def.window[0] = 4;
+    def.window[1] = 12;
+    def.window_value[1] = 0;
+    def.value = 0;
+    r = measure(&def);
+    near(r.value, -3 * (4 - 2.5 * 3.6 + 5), 1e-12);
+
+    // nothing in the window, too short a run, no such column
+    r = scalar("wave", SCALAR_MEAN, 11, 12, 3);
+    assert_false(r.pass);
+    contains(r.note, "no data in the window");
+    r = scalar("gap", SCALAR_MAX, 0, 4, 0);
+    assert_false(r.pass);
+    contains(r.note, "no data in the window");
+    r = scalar("wave", SCALAR_MAX, 0, 20, 3.5);
+    assert_false(r.pass);
+    contains(r.note, "the result ends at 10, before the window's end 20");
+    r = scalar("wave", SCALAR_PERIOD, 0, 1, 1.7);
+    assert_false(r.pass);
+    contains(r.note, "fewer than two upward crossings");
+    r = scalar("absent", SCALAR_MAX, 0, 1, 1);
+    assert_false(r.pass);
+    contains(r.note, "no column absent");
+}
+
+static void test_checks_curve(void **state) {
+    (void)state;
+    checks_history();
+    // rows of two runs and a column of words; run 1 is 4 - 2.5 t with errors 0.1, 0.1 and 0.2
+    make("line.csv", "# a comment\nwho,run,t,y\nme,1,0.1025,3.84375\nme,1,1,1.6\nme,1,2,-1.2\nme,2,1,99\n");
+    silt_check_def def = check_of("line", "external_work");
+    def.reference = (char *)(uintptr_t) "line.csv";
+    def.x = (char *)(uintptr_t) "t";
+    def.y = (char *)(uintptr_t) "y";
+    def.where_column = (char *)(uintptr_t) "run";
+    def.where_value = 1;
+    def.norm = NORM_MAX;
+    def.relative_to = 4;
+    silt_check_result r = measure(&def);
+    near(r.error, 0.05, 1e-12);
+    near(r.value, -1, 1e-12);
+    near(r.reference, -1.2, 0);
+    contains(r.note, "3 rows of the reference");
+    def.norm = NORM_L2;
+    near(measure(&def).error, sqrt((0.01 + 0.01 + 0.04) / 3) / 4, 1e-12);
+    // pointwise relative, in windows of the abscissa and of the ordinate
+    def.relative_to = 0;
+    def.norm = NORM_MAX;
+    def.window[1] = 1.5;
+    near(measure(&def).error, 0.1 / 1.6, 1e-12);
+    def.window_value[0] = 2;
+    near(measure(&def).error, 0.1 / 3.84375, 1e-12);
+    def.tolerance = 0.03;
+    assert_true(measure(&def).pass);
+    def.window[0] = 1.2;
+    r = measure(&def);
+    assert_false(r.pass);
+    contains(r.note, "no data: 0 rows of the reference are in the window");
+
+    // t^2 against the same curve 0.75 s later: aligned where both are 4
+    make("front.csv", "t,x\n1.75,1\n2.75,4\n3.75,9\n5.75,25\n12,126.5625\n");
+    def = check_of("front", "front");
+    def.reference = (char *)(uintptr_t) "front.csv";
+    def.x = (char *)(uintptr_t) "t";
+    def.y = (char *)(uintptr_t) "x";
+    assert_false(measure(&def).pass);
+    def.align = 4;
+    r = measure(&def);
+    near(r.error, 0, 1e-5);
+    assert_true(r.pass);
+    contains(r.note, "4 of 5 rows of the reference");
+    // a window that the run does not reach
+    def.window[1] = 13;
+    r = measure(&def);
+    assert_false(r.pass);
+    contains(r.note, "1 rows of the reference in the window come later");
+    def.align = 1000;
+    r = measure(&def);
+    assert_false(r.pass);
+    contains(r.note, "the result never reaches 1000");
+
+    // gaps of the gauge are no data
+    make("gap.csv", "t,y\n1,1\n2,2\n6,6\n");
+    def = check_of("gap", "gap");
+    def.reference = (char *)(uintptr_t) "gap.csv";
+    def.x = (char *)(uintptr_t) "t";
+    def.y = (char *)(uintptr_t) "y";
+    r = measure(&def);
+    near(r.error, 0, 1e-12);
+    contains(r.note, "1 of 3 rows");
+    def.y = (char *)(uintptr_t) "z";
+    r = measure(&def);
+    assert_false(r.pass);
+    contains(r.note, "has no column z");
+    def.reference = (char *)(uintptr_t) "nowhere.csv";
+    r = measure(&def);
+    assert_false(r.pass);
+    contains(r.note, "nowhere.csv");
+}
+
+// ---------------------------------------------------------------- verify, summary, info
+
+static void test_verify(void **state) {
+    (void)state;
+    silt_error err = {0};
+    silt_scene *scene = NULL;
+    mkdir(place("scene"), 0777);
+    mkdir(place("scene.out"), 0777);
+    make("scene/scene.yaml", SCENE);
+    make("scene/curve.csv", "t,x\n1,1\n2,4\n");
+    if (silt_scene_read(place("scene/scene.yaml"), 0, NULL, &scene, &err))
+        fail_msg("%s", err.text);
+    assert_int_equal(silt_verify_copy(scene, place("scene.out"), &err), SILT_OK);
+    assert_string_equal(content("scene.out/curve.csv"), "t,x\n1,1\n2,4\n");
+    // OUT names the copy, which alone is enough
+    contains(content("scene.out/scene.yaml"), "reference: \"curve.csv\"\n");
+    assert_int_equal(unlink(place("scene/curve.csv")), 0);
+    checks_history();
+    assert_int_equal(rename(place("history.csv"), place("scene.out/history.csv")), 0);
+    FILE *to = fopen(place("verify.txt"), "w");
+    assert_int_equal(silt_verify(place("scene.out"), to, &err), SILT_OK);
+    fclose(to);
+    contains(content("verify.txt"),
+             "line                                -21            -21           0        0.01  pass");
+    contains(content("verify.txt"), "pass (2 rows of the reference)");
+
+    // one wrong, one unmeasurable
+    make("scene.out/curve.csv", "t,x\n1,1\n2,5\n");
+    to = fopen(place("verify.txt"), "w");
+    assert_int_equal(silt_verify(place("scene.out"), to, &err), SILT_FAILED);
+    fclose(to);
+    contains(content("verify.txt"), "FAIL");
+    contains(err.text, "1 of 2 checks failed");
+
+    // the summary has the same checks
+    const silt_nodes nodes = {.count = 8};
+    const silt_view view = {.scene = scene, .nodes = &nodes, .step = 2000, .time = 10};
+    scene->title[0] = '"';
+    silt_summary summary = {
+        .status = "done", .seconds = 2, .node_steps = 1e5, .worst_volume_error = 1e-4, .steps = 2000};
+    summary.phase[PHASE_solve] = 1;
+    assert_int_equal(silt_summary_write(place("scene.out"), &view, &summary, &err), SILT_OK);
+    contains(content("scene.out/summary.json"), "\"title\": \"\\\" small world\"");
+    contains(content("scene.out/summary.json"), "\"microseconds_per_node_step\": 20,");
+    contains(content("scene.out/summary.json"), "\"solve\": {\"seconds\": 1, \"microseconds_per_node_step\": 10}");
+    contains(content("scene.out/summary.json"),
+             "{\"name\": \"line\", \"value\": -21, \"reference\": -21, \"error\": 0,");
+    contains(content("scene.out/summary.json"), "\"pass\": false, \"note\": \"2 rows of the reference\"}");
+
+    to = fopen(place("info.txt"), "w");
+    assert_int_equal(silt_info(place("scene.out"), to, &err), SILT_OK);
+    assert_int_equal(silt_info(place("scene/scene.yaml"), to, &err), SILT_INPUT); // its reference is gone
+    assert_int_equal(silt_info(place("scene.out/scene.yaml"), to, &err), SILT_OK);
+    assert_int_equal(silt_info(place("scene"), to, &err), SILT_INPUT);
+    fclose(to);
+    contains(content("info.txt"), "\" small world\n  status     done");
+    contains(content("info.txt"), "reached    10 of 10 s in 2000 steps");
+    contains(content("info.txt"), "checks     1 of 2 pass");
+    silt_scene_free(&scene);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_checks_scalar),
+        cmocka_unit_test(test_checks_curve),
+        cmocka_unit_test(test_verify),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
