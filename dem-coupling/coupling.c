@@ -351,10 +351,13 @@ static void coupling_load(silt_coupling *c, const silt_nodes *nodes, const silt_
             c->grain[i].force[k] = c->wet && i < c->n_loaded ? c->exchange.grain[i].force[k] : 0.0;
 }
 
-static void coupling_exchanged(const silt_coupling *c, double grains[2], double water[2]) {
+static void coupling_exchanged(const silt_coupling *c, silt_exchanged *exchanged) {
+    const silt_exchange_totals *t = &c->exchange.totals;
+    *exchanged = (silt_exchanged){.size = t->size};
     for (int k = 0; k < 2; k++) {
-        grains[k] = c->exchange.totals.pressure[k] + c->exchange.totals.drag[k];
-        water[k] = c->exchange.totals.water[k];
+        exchanged->grains[k] = t->pressure[k] + t->drag[k];
+        exchanged->water[k] = t->water[k];
+        exchanged->contact[k] = c->contact[k];
     }
 }
 
@@ -467,6 +470,7 @@ static void coupling_receive(silt_coupling *c, coupling_grain *g, const silt_dem
     for (int d = 0; d < 2; d++) {
         net[d] = g->mass * (g->v[d] - g->old_v[d]) / c->elapsed;
         g->contact[d] = net[d] - g->force[d] - g->mass * c->scene->gravity[d];
+        c->contact[d] += g->contact[d];
     }
     g->net = hypot(net[0], net[1]);
 }
@@ -475,6 +479,7 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
     SILT_TRY(silt_dem_wait(c->dem, err));
     const silt_dem_state *state = silt_dem_state_now(c->dem);
     const silt_fluid_def *fluid = &c->scene->fluid;
+    c->contact[0] = c->contact[1] = 0.0;
     for (int i = 0, k = 0; i < c->n_grain; i++) {
         coupling_grain *g = &c->grain[i];
         while (k < state->n_grain && state->id[k] < g->id)

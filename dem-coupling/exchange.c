@@ -249,6 +249,7 @@ void silt_exchange_load(silt_exchange *e, const double *velocity, const double *
             g->force[k] = g->effective * (g->water[k] - g->free[k]);
             t->drag[k] += g->force[k];
         }
+        t->size += hypot(g->force[0], g->force[1]);
     }
     exchange_smooth_gradient(e, pressure);
     for (int p = 0; p < e->n_grain; p++) {
@@ -258,6 +259,7 @@ void silt_exchange_load(silt_exchange *e, const double *velocity, const double *
             g->force[k] += g->pressure[k];
             t->pressure[k] += g->pressure[k];
         }
+        t->size += hypot(g->pressure[0], g->pressure[1]);
     }
 }
 

@@ -36,6 +36,7 @@ typedef struct silt_exchange_totals {
     double pressure[2]; // of the pressure gradient on grains
     double drag[2];     // of drag on grains
     double water[2];    // of drag on the water: sum over nodes of push - coefficient u; minus drag to rounding
+    double size;        // sum over grains of the magnitudes of both parts
 } silt_exchange_totals;
 
 typedef struct silt_exchange {

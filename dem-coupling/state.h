@@ -70,6 +70,7 @@ struct silt_coupling {
     double *force;        // owned, 3 per grain, N
     silt_dem_sphere *add; // owned
     double elapsed;       // s, of the running substeps
+    double contact[2];    // N/m, of contacts on all grains, of the last substeps
     double left_mass;
     int64_t left_count;
     silt_error refused; // why a release cannot be; returned by the next start

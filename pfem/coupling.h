@@ -18,6 +18,14 @@ typedef struct silt_coupling_def {
     double lo[2], hi[2];     // the domain's box (with margin): what leaves it has left
 } silt_coupling_def;
 
+/** what passed between grains, water and the rest in a step: N per m of width, mean over the step */
+typedef struct silt_exchanged {
+    double grains[2];  // the water's force on all grains, pressure gradient and drag
+    double size;       // the magnitudes of its parts, grain by grain: what an error of it is relative to
+    double water[2];   // the grains' drag on the water: sum over nodes of push - coefficient velocity
+    double contact[2]; // of all contacts on all grains; those of grains with each other cancel
+} silt_exchanged;
+
 typedef struct silt_coupling_type {
     silt_status (*open)(silt_coupling **coupling, const silt_coupling_def *def, silt_error *err);
     /** s, the discrete elements' time step; the fluid's step is an integer multiple of it */
@@ -36,9 +44,8 @@ typedef struct silt_coupling_type {
      * forces on bodies: force and torque in bodies()->body[] were set by the run. */
     void (*load)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, double dt);
 
-    /** N per m of width, of the last load: the water's force on all grains (pressure gradient and drag), and the grains' drag
-     * on the water as the sum over nodes of push - coefficient velocity */
-    void (*exchanged)(const silt_coupling *coupling, double grains[2], double water[2]);
+    /** of the last load and the last substeps */
+    void (*exchanged)(const silt_coupling *coupling, silt_exchanged *exchanged);
     /** Points on a body's outline at spacing h, corners kept, in the body's frame; @return how many (none written beyond capacity) */
     int (*outline)(const silt_coupling *coupling, int body, double h, double *point, int capacity);
 

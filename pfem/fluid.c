@@ -4,6 +4,7 @@
 #define FLUID_FLAT 0.05      // a cell that shrinks below this share on its way keeps the shape it had at the start
 #define FLUID_DEBT_CAP 0.3   // largest share of a node's volume that its debt may ask for
 #define FLUID_CG_LIMIT 3000
+#define FLUID_STIFF 0.5     // weight of the viscous part of the pressure correction
 
 void silt_fluid_clear(silt_fluid *fluid) {
     free(fluid->x_mid);
@@ -436,6 +437,7 @@ static void reactions(silt_fluid *f, const silt_scene *scene, const silt_nodes *
     f->from_grains[0] = f->from_grains[1] = 0;
     double lost[2] = {0, 0}, unbalanced[2] = {0, 0};
     f->momentum_scale = 0;
+    f->worked = 0;
     memset(f->scratch, 0, 2 * (size_t)f->n_node * sizeof(double));
     add_pressure(f, mesh, p, f->scratch, lost);
     for (int i = 0; i < f->n_node; i++) {
@@ -447,6 +449,9 @@ static void reactions(silt_fluid *f, const silt_scene *scene, const silt_nodes *
         project(f, i, free_part);
         for (int d = 0; d < 2; d++) {
             out[2 * i + d] -= free_part[d];
+            f->worked += dt * out[2 * i + d] * f->w[2 * i + d];
+            if (drag)
+                f->worked += dt * (drag->push[2 * i + d] - drag->coefficient[i] * f->w[2 * i + d]) * f->w[2 * i + d];
             unbalanced[d] += free_part[d];
             f->momentum_scale += fabs(f->mass[i] * scene->gravity[d]) + fabs(f->inertia[i] * (f->w[2 * i + d] - nodes->v[2 * i + d]));
             if (drag)
@@ -554,9 +559,9 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_scene *scene, const s
             for (int d = 0; d < 2; d++)
                 f->w[2 * i + d] = f->star[2 * i + d] + (mesh->wet[i] ? dv[d] : 0);
             p[i] += f->increment[i];
-            // stiff viscosity: the Schur complement is nearer to the viscous one (physics 15)
+            // stiff viscosity: the Schur complement is nearer to the viscous one; with the stabilisation in it 0.5 converges
             if (stiff > 1 && mesh->wet[i])
-                p[i] += 1.5 * def->viscosity * f->residual[i] / f->volume[i];
+                p[i] += FLUID_STIFF * def->viscosity * f->residual[i] / f->volume[i];
         }
         project_gradient(f, mesh, p);
         f->seconds_assemble += silt_seconds() - tick;

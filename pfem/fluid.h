@@ -35,6 +35,7 @@ typedef struct silt_fluid {
     double worst;             // largest |residual| dt / volume
     double from_grains[2];    // N, force of the grains on the water
     double dissipated;        // J, viscous
+    double worked;            // J, of bodies, inlets and grains on the water
     double solved_volume;     // m3, sum of residual times dt
     double given_back;        // m3, volume that the debts asked for
     double momentum_residual; // N, unbalanced force on free nodes

@@ -166,6 +166,32 @@ static void carry_slip(silt_run *run) {
         }
 }
 
+// A node that lands on a wall without slip stops at once, which no wall could do to it: the momentum along the wall stays in
+// the water around it, and the wall brakes through viscosity only. `before` holds walls and velocities before contact.
+static void hand_on_landing(silt_run *run, const int *wall_before, const double *v_before) {
+    const silt_mesh *mesh = &run->mesh;
+    silt_nodes *nodes = &run->nodes;
+    for (int i = 0; i < mesh->n_node; i++) {
+        const int s = nodes->wall[i][0];
+        if (wall_before[i] >= 0 || s < 0 || run->walls.slip[s] || !mesh->wet[i])
+            continue;
+        const double *n = run->walls.normal[s], tangent[2] = {n[1], -n[0]};
+        const double momentum = run->fluid.mass[i] * (v_before[2 * i] * tangent[0] + v_before[2 * i + 1] * tangent[1]);
+        double mass = 0;
+        for (int pass = 0; pass < 2; pass++)
+            for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++) {
+                const int j = mesh->neighbour[k];
+                if (j == i || nodes->kind[j] != NODE_FLUID || nodes->wall[j][0] >= 0)
+                    continue;
+                if (pass == 0)
+                    mass += run->fluid.mass[j];
+                else
+                    for (int d = 0; d < 2; d++)
+                        nodes->v[2 * j + d] += momentum / mass * tangent[d];
+            }
+    }
+}
+
 // bed cells that became water, and water that became bed, in the numbers of the nodes
 static void remember_bed(silt_run *run) {
     silt_memory *memory = &run->memory;
@@ -235,7 +261,13 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     for (int k = 2 * n; k < 2 * nodes->count; k++)
         run->x_old[k] = nodes->x[k];
     remember_bed(run);
+    SILT_RESERVE(run->wall_before, run->wall_before_capacity, nodes->count + 1);
+    SILT_RESERVE(run->v_before, run->v_before_capacity, 2 * nodes->count + 2);
+    for (int i = 0; i < nodes->count; i++)
+        run->wall_before[i] = nodes->wall[i][0];
+    memcpy(run->v_before, nodes->v, 2 * (size_t)nodes->count * sizeof(double));
     silt_walls_contact(&run->walls, nodes, run->x_old, run->memory.interior, h);
+    hand_on_landing(run, run->wall_before, run->v_before);
     let_out(run);
     expel(run);
     silt_mesh_refine(mesh, nodes, &run->memory, h);

@@ -235,10 +235,15 @@ typedef struct silt_ledger {
     double initial_sediment;
     int grain_count;
     double grain_mass, sediment_error;
+    double grain_velocity[3];                     // m/s, mean by mass
+    double grain_water[3], grain_contact[3];      // N/m, force of the water and of contacts on all grains, mean of the last step
     double external_work, dissipation;            // J/m, cumulative
+    double max_speed;                             // m/s, of the water's nodes
     // where volume went, cumulative, m3: solved (divergence left), moved (integration), reconnected (remeshing), edited (nodes added, removed)
     double volume_solved, volume_moved, volume_reconnected, volume_edited;
-    double momentum_error; // N s/m: impulse of gravity, walls, bed, bodies and grains against the water's momentum in the step's solve, relative
+    // the larger of two, of the last step's solve: force on the water that its inertia does not answer, relative to weight and
+    // inertia; force of the grains on the water plus force of the water on the grains, relative to what they exchange
+    double momentum_error;
 } silt_ledger;
 
 // ---------------------------------------------------------------- checkpoint (store.c): a tree of named arrays

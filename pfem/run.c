@@ -1,9 +1,6 @@
 // the time loop, and what stands before and after it
-#include <errno.h>
-#include <fcntl.h>
 #include <omp.h>
 #include <signal.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "run.h"
@@ -81,14 +78,27 @@ static void ledger_take(silt_run *run) {
             ledger->potential_energy -= rho * volume * nodes->x[2 * i + d] * scene->gravity[d];
         }
     }
+    ledger->max_speed = 0;
+    for (int i = 0; i < nodes->count; i++)
+        if (run->mesh.wet[i] || nodes->kind[i] == NODE_FLUID)
+            ledger->max_speed = silt_max(ledger->max_speed, hypot(nodes->v[2 * i], nodes->v[2 * i + 1]));
     ledger->fluid_volume += ledger->flying_volume;
     ledger->fluid_mass = rho * ledger->fluid_volume;
     ledger->bed_mass = run->bed.solid_mass;
     ledger->pore_water_mass = run->bed.pore_water;
     ledger->grain_count = 0;
     ledger->grain_mass = 0;
+    memset(ledger->grain_velocity, 0, sizeof ledger->grain_velocity);
     if (run->coupling) {
         const silt_grain_state *grains = silt_coupling_dem.grains(run->coupling);
+        double moving = 0;
+        for (int k = 0; k < grains->count; k++) {
+            moving += grains->mass[k];
+            for (int d = 0; d < 3; d++)
+                ledger->grain_velocity[d] += grains->mass[k] * grains->v[3 * k + d];
+        }
+        for (int d = 0; d < 3 && moving > 0; d++)
+            ledger->grain_velocity[d] /= moving;
         ledger->grain_count = grains->count + run->n_waiting;
         // summed with care: the sediment must close to rounding
         double carry = 0;
@@ -117,6 +127,24 @@ static void ledger_take(silt_run *run) {
     summary->worst_momentum_error = silt_max(summary->worst_momentum_error, ledger->momentum_error);
 }
 
+// forces of the step that was solved: what the water's momentum leaves open, and whether what grains got the water lost
+static void ledger_balance(silt_run *run) {
+    silt_ledger *ledger = &run->ledger;
+    const silt_fluid *fluid = &run->fluid;
+    ledger->momentum_error = fluid->momentum_scale > 0 ? fluid->momentum_residual / fluid->momentum_scale : 0;
+    if (!run->coupling)
+        return;
+    silt_exchanged exchanged;
+    silt_coupling_dem.exchanged(run->coupling, &exchanged);
+    for (int d = 0; d < 2; d++) {
+        ledger->grain_water[d] = exchanged.grains[d];
+        ledger->grain_contact[d] = exchanged.contact[d];
+    }
+    const double open = hypot(fluid->from_grains[0] + exchanged.grains[0], fluid->from_grains[1] + exchanged.grains[1]);
+    if (exchanged.size > 0)
+        ledger->momentum_error = silt_max(ledger->momentum_error, open / exchanged.size);
+}
+
 // ---------------------------------------------------------------- steps in time
 
 // largest step that accuracy allows: courant number, cells that do not turn over, gravity, growth
@@ -136,8 +164,11 @@ static double step_wanted(const silt_run *run) {
         dt = silt_min(dt, scene->time.cfl * h / fastest);
     if (g > 0)
         dt = silt_min(dt, scene->time.cfl * sqrt(h / g));
-    if (run->dt > 0)
-        dt = silt_min(dt, 1.5 * run->dt);
+    // it grows by half at most, and with grains by one of their steps at least
+    if (run->dt > 0) {
+        const double small = run->coupling ? silt_coupling_dem.step(run->coupling) : 0;
+        dt = silt_min(dt, run->dt + silt_max(small, 0.5 * run->dt));
+    }
 
     // a cell may lose four fifths of its area; slivers do not decide
     const double least = 0.25 * dt;
@@ -165,7 +196,7 @@ static int64_t step_choose(silt_run *run, double wanted) {
     if (run->coupling) {
         const double small = silt_coupling_dem.step(run->coupling);
         const int64_t per_frame = (int64_t)floor(output / small + 0.5), left = per_frame - run->tick;
-        int64_t n = (int64_t)floor(wanted / small);
+        int64_t n = (int64_t)floor(wanted / small * (1 + 1e-9));
         n = n < 1 ? 1 : n > left ? left : n;
         if (n < left && left < 2 * n)
             n = (left + 1) / 2; // two even steps rather than a long and a tiny one
@@ -201,20 +232,40 @@ static void clock_advance(silt_run *run, int64_t n) {
 
 // ---------------------------------------------------------------- one step
 
+// what a try at the water's step changes is put back: prescribed velocities, debts that spread
+static void water_keep(silt_run *run) {
+    const size_t n = (size_t)run->nodes.count;
+    SILT_RESERVE(run->v_old, run->v_old_capacity, 2 * run->nodes.count + 2);
+    SILT_RESERVE(run->debt_old, run->debt_old_capacity, run->nodes.count + 1);
+    memcpy(run->v_old, run->nodes.v, 2 * n * sizeof(double));
+    memcpy(run->debt_old, run->nodes.debt, n * sizeof(double));
+}
+
+static void water_restore(silt_run *run) {
+    const size_t n = (size_t)run->nodes.count;
+    memcpy(run->nodes.v, run->v_old, 2 * n * sizeof(double));
+    memcpy(run->nodes.debt, run->debt_old, n * sizeof(double));
+    silt_pressure_forget(run->fluid.pressure);
+}
+
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
     const silt_scene *scene = run->scene;
+    water_keep(run);
     for (int attempt = 0;; attempt++) {
         silt_status status = SILT_OK;
         silt_run_prescribe(run);
         if (run->coupling)
             PHASE(dem, status = silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
-        if (status != SILT_OK)
+        if (status != SILT_OK) {
+            water_restore(run);
             return status;
+        }
         status = silt_fluid_step(&run->fluid, scene, &run->walls, &run->nodes, &run->mesh, run->drag, run->dt, err);
         run->phase[PHASE_assemble] += run->fluid.seconds_assemble;
         run->phase[PHASE_solve] += run->fluid.seconds_solve;
         if (status == SILT_OK)
             return SILT_OK;
+        water_restore(run);
         const bool least = run->coupling && *n <= 1;
         if (attempt >= scene->time.retries || least) {
             char why[sizeof err->text];
@@ -227,7 +278,6 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         if (err)
             *err = (silt_error){0};
         run->summary.retries++;
-        silt_pressure_forget(run->fluid.pressure);
         if (run->coupling) {
             *n /= 2;
             run->dt = (double)*n * silt_coupling_dem.step(run->coupling);
@@ -236,21 +286,36 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
     }
 }
 
-// what the water does to bodies: the reaction of their nodes, turned round
-static void load_bodies(silt_run *run) {
+// What the water does to bodies: the reaction of their nodes, turned round. The water saw the body's last change of speed
+// as its acceleration and answers with its added mass, and with theta below 1 it rings on: the body takes only the share of
+// a new force that leaves this loop stable whatever its contacts do; a steady force comes through whole. before: last
+// step, s
+static void load_bodies(silt_run *run, double before) {
     silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    const double rho = run->scene->fluid.density, theta = run->scene->fluid.theta;
+    const double ratio = (before > 0 ? silt_clamp(before / run->dt, 1, 20) : 1) / theta;
+    const double most = silt_max(2 - 1 / theta, 0.1); // half of what the linear loop bears
     for (int b = 0; b < bodies->count; b++) {
-        memset(bodies->body[b].force, 0, sizeof bodies->body[b].force);
-        memset(bodies->body[b].torque, 0, sizeof bodies->body[b].torque);
-    }
-    for (int i = 0; i < run->nodes.count; i++) {
-        if (run->nodes.kind[i] != NODE_BODY || !run->mesh.wet[i])
-            continue;
-        struct silt_body *body = &bodies->body[run->nodes.owner[i]];
-        const double fx = -run->fluid.reaction[2 * i], fy = -run->fluid.reaction[2 * i + 1];
-        body->force[0] += fx;
-        body->force[1] += fy;
-        body->torque[2] += (run->nodes.x[2 * i] - body->x[0]) * fy - (run->nodes.x[2 * i + 1] - body->x[1]) * fx;
+        struct silt_body *body = &bodies->body[b];
+        double force[2] = {0, 0}, torque = 0, reach = 0;
+        bool wet = false;
+        for (int i = 0; i < run->nodes.count; i++) {
+            if (run->nodes.kind[i] != NODE_BODY || run->nodes.owner[i] != b || !run->mesh.wet[i])
+                continue;
+            const double fx = -run->fluid.reaction[2 * i], fy = -run->fluid.reaction[2 * i + 1];
+            force[0] += fx;
+            force[1] += fy;
+            torque += (run->nodes.x[2 * i] - body->x[0]) * fy - (run->nodes.x[2 * i + 1] - body->x[1]) * fx;
+            wet = true;
+        }
+        for (int k = 0; k < body->n_point; k++)
+            reach = silt_max(reach, hypot(body->outline[2 * k], body->outline[2 * k + 1]));
+        // added mass and inertia: those of the disc around it
+        const double added = rho * M_PI * silt_square(reach), turned = 0.25 * added * silt_square(reach);
+        const double share = most / (1 + ratio * added / body->mass), twist = most / (1 + ratio * turned / body->inertia);
+        for (int d = 0; d < 2; d++)
+            body->force[d] = wet ? body->force[d] + share * (force[d] - body->force[d]) : 0;
+        body->torque[2] = wet ? body->torque[2] + twist * (torque - body->torque[2]) : 0;
     }
     SILT_RESERVE(run->body_before, run->body_before_capacity, bodies->count + 1);
     memcpy(run->body_before, bodies->body, (size_t)bodies->count * sizeof *bodies->body);
@@ -260,14 +325,21 @@ static void load_bodies(silt_run *run) {
 static silt_status run_step(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     memset(run->phase, 0, sizeof run->phase);
+    const double before = run->dt;
     int64_t n = step_choose(run, step_wanted(run));
 
     SILT_RESERVE(run->x_old, run->x_old_capacity, 2 * run->nodes.count + 2);
     memcpy(run->x_old, run->nodes.x, 2 * (size_t)run->nodes.count * sizeof(double));
+    silt_status solved = SILT_OK;
     if (scene->fluid.on)
-        SILT_TRY(water_step(run, &n, err));
+        solved = water_step(run, &n, err);
     else if (run->coupling)
-        SILT_TRY(silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
+        solved = silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err);
+    if (solved != SILT_OK) {
+        run->dt = before;
+        return solved;
+    }
+    run->whole = false;
 
     if (scene->bed.on)
         PHASE(bed, {
@@ -279,7 +351,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         silt_status status = SILT_OK;
         PHASE(dem, {
             silt_run_place(run);
-            load_bodies(run);
+            load_bodies(run, before);
             silt_nodes moving = run->nodes; // with the velocity that the drag was solved with
             moving.v = run->fluid.w ? run->fluid.w : run->nodes.v;
             silt_coupling_dem.load(run->coupling, &moving, &run->mesh, run->dt);
@@ -295,9 +367,9 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     if (scene->fluid.on) {
         SILT_TRY(silt_run_move(run, err));
         run->ledger.dissipation += run->fluid.dissipated;
-        run->ledger.momentum_error =
-            run->fluid.momentum_scale > 0 ? run->fluid.momentum_residual / run->fluid.momentum_scale : 0;
+        run->ledger.external_work += run->fluid.worked;
     }
+    ledger_balance(run);
     clock_advance(run, n);
     return SILT_OK;
 }
@@ -326,138 +398,44 @@ static silt_status step_output(silt_run *run, silt_error *err) {
     run->summary.iterations += run->fluid.iterations;
     run->summary.steps++;
     run->output_seconds = silt_seconds() - since;
+    run->whole = true;
     return SILT_OK;
 }
 
 static silt_status checkpoint_write(silt_run *run, silt_error *err) {
+    if (run->saved_step == run->step)
+        return SILT_OK;
     // the history must reach the disk first: a checkpoint is never ahead of it
-    SILT_TRY(silt_history_sync(run->history, err));
+    silt_status status = silt_history_sync(run->history, err);
     char *path = silt_text("%s/checkpoint-%c.h5", run->out, 'a' + run->checkpoint_slot);
-    const silt_status status = silt_run_save(run, path, err);
-    free(path);
     if (status == SILT_OK)
+        status = silt_run_save(run, path, err);
+    free(path);
+    run->whole = status == SILT_OK;
+    if (status == SILT_OK) {
         run->checkpoint_slot = 1 - run->checkpoint_slot;
+        run->saved_step = run->step;
+        run->saved_time = run->time;
+    }
     return status;
 }
 
+// a run that fails tells where it can be taken up again; when only the next step failed, that is where it stands
+static void run_failed(silt_run *run, silt_error *err) {
+    silt_error late = {0};
+    if (run->whole)
+        checkpoint_write(run, &late);
+    if (!err)
+        return;
+    const size_t used = strlen(err->text), room = sizeof err->text - used;
+    if (late.count)
+        snprintf(err->text + used, room, "\nno checkpoint of this state: %s", late.text);
+    else if (run->saved_step >= 0)
+        snprintf(err->text + used, room, "\nthe last checkpoint is of step %lld, t = %.9g s; go on from it with: silt resume %s",
+                 (long long)run->saved_step, run->saved_time, run->out);
+}
+
 // ---------------------------------------------------------------- open and close
-
-static bool run_solid(const void *context, const double x[2], double margin) {
-    const silt_barrier *barrier = context;
-    if (barrier->bed) {
-        if (silt_bed_contains(barrier->bed, x))
-            return true;
-        for (int k = 0; k < barrier->bed->n_node; k++)
-            if (barrier->bed->exposed[k] && hypot(barrier->bed->x[k][0] - x[0], barrier->bed->x[k][1] - x[1]) < margin)
-                return true;
-    }
-    const silt_barrier bodies = {.bodies = barrier->bodies};
-    if (silt_barrier_contains(&bodies, x))
-        return true;
-    for (int k = 0; margin > 0 && barrier->bodies && k < 8; k++) {
-        const double probe[2] = {x[0] + margin * cos(k * M_PI / 4), x[1] + margin * sin(k * M_PI / 4)};
-        if (silt_barrier_contains(&bodies, probe))
-            return true;
-    }
-    return false;
-}
-
-void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def) {
-    *def = (silt_coupling_def){.scene = run->scene, .walls = &run->walls, .bed = run->scene->bed.on ? &run->bed : NULL,
-                               .worker = run->worker, .log = run->log};
-    memcpy(def->lo, run->box_lo, sizeof def->lo);
-    memcpy(def->hi, run->box_hi, sizeof def->hi);
-}
-
-// everything that walls, regions and bodies span, and room for splashes
-static void run_box(silt_run *run) {
-    const silt_scene *scene = run->scene;
-    double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL};
-#define SPAN(px, py)                                                                                                   \
-    do {                                                                                                               \
-        const double span_[2] = {(px), (py)};                                                                          \
-        for (int d_ = 0; d_ < 2; d_++) {                                                                               \
-            lo[d_] = silt_min(lo[d_], span_[d_]);                                                                      \
-            hi[d_] = silt_max(hi[d_], span_[d_]);                                                                      \
-        }                                                                                                              \
-    } while (0)
-    for (int s = 0; s < run->walls.count; s++) {
-        SPAN(run->walls.from[s][0], run->walls.from[s][1]);
-        SPAN(run->walls.to[s][0], run->walls.to[s][1]);
-    }
-    const silt_region *lists[2] = {scene->fluid.region, scene->bed.region};
-    const int counts[2] = {scene->fluid.n_region, scene->bed.n_region};
-    for (int l = 0; l < 2; l++)
-        for (int r = 0; r < counts[l]; r++) {
-            const silt_region *region = &lists[l][r];
-            if (region->kind == REGION_BOX) {
-                SPAN(region->lo[0], region->lo[1]);
-                SPAN(region->hi[0], region->hi[1]);
-            } else if (region->kind == REGION_CIRCLE) {
-                SPAN(region->centre[0] - region->radius, region->centre[1] - region->radius);
-                SPAN(region->centre[0] + region->radius, region->centre[1] + region->radius);
-            }
-            for (int k = 0; k < region->n_point; k++)
-                SPAN(region->point[3 * k], region->point[3 * k + 1]);
-        }
-    for (int b = 0; b < scene->n_body; b++) {
-        const double reach = silt_max(scene->body[b].scale, scene->body[b].height);
-        SPAN(scene->body[b].at[0] - reach, scene->body[b].at[1] - reach);
-        SPAN(scene->body[b].at[0] + reach, scene->body[b].at[1] + reach);
-    }
-    for (int k = 0; k < scene->grains.n_grain; k++) {
-        const silt_grain_def *grain = &scene->grains.grain[k];
-        SPAN(grain->at[0] - grain->diameter, grain->at[1] - grain->diameter);
-        SPAN(grain->at[0] + grain->diameter, grain->at[1] + grain->diameter);
-    }
-#undef SPAN
-    for (int d = 0; d < 2; d++) {
-        const double margin = 0.5 * silt_max(hi[0] - lo[0], hi[1] - lo[1]);
-        run->box_lo[d] = lo[d] - margin;
-        run->box_hi[d] = hi[d] + margin;
-    }
-}
-
-static silt_status run_first(silt_run *run, silt_error *err) {
-    const silt_scene *scene = run->scene;
-    if (scene->bed.on)
-        SILT_TRY(silt_bed_create(&run->bed, scene, err));
-    run->bed_revision = run->bed.revision;
-    if (silt_scene_has_dem(scene)) {
-        silt_coupling_def def;
-        silt_coupling_def_fill(run, &def);
-        SILT_TRY(silt_coupling_dem.open(&run->coupling, &def, err));
-        run->barrier.bodies = silt_coupling_dem.bodies(run->coupling);
-    }
-    if (scene->bed.on)
-        run->barrier.bed = &run->bed;
-    run->barrier.walls = &run->walls;
-    if (!scene->fluid.on)
-        return SILT_OK;
-
-    // bodies and bed first: the water keeps its distance
-    for (int b = 0; run->barrier.bodies && b < run->barrier.bodies->count; b++) {
-        const struct silt_body *body = &run->barrier.bodies->body[b];
-        const double c = 1 - 2 * silt_square(body->q[3]), s = 2 * body->q[0] * body->q[3];
-        const int n = silt_coupling_dem.outline(run->coupling, b, scene->fluid.size, NULL, 0);
-        double *point = silt_alloc(2 * (size_t)n + 2, sizeof *point);
-        silt_coupling_dem.outline(run->coupling, b, scene->fluid.size, point, n);
-        for (int k = 0; k < n; k++) {
-            const double x[2] = {body->x[0] + c * point[2 * k] - s * point[2 * k + 1],
-                                 body->x[1] + s * point[2 * k] + c * point[2 * k + 1]};
-            silt_nodes_add(&run->nodes, NODE_BODY, b, x);
-        }
-        free(point);
-    }
-    for (int k = 0; k < run->bed.n_node; k++)
-        if (run->bed.exposed[k])
-            run->bed.fluid_node[k] = silt_nodes_add(&run->nodes, NODE_BED, k, run->bed.x[k]);
-    silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
-    SILT_TRY(silt_mesh_first(&run->mesh, &run->nodes, scene, &run->barrier, err));
-    // nodes of the cloud that got no cell at the start are no drops: they hold no water
-    silt_locator_build(&run->locator, &run->mesh, run->nodes.x, scene->fluid.size);
-    return SILT_OK;
-}
 
 static void run_free(silt_run *run) {
     silt_coupling_dem.close(&run->coupling);
@@ -469,6 +447,9 @@ static void run_free(silt_run *run) {
     silt_bed_clear(&run->bed);
     silt_walls_clear(&run->walls);
     silt_gauges_free(&run->gauges);
+    silt_history_close(&run->history, NULL);
+    if (run->lock >= 0)
+        close(run->lock);
     free(run->gauge);
     free(run->waiting);
     free(run->rest);
@@ -478,51 +459,37 @@ static void run_free(silt_run *run) {
     free(run->grown_area);
     free(run->body_before);
     free(run->x_old);
+    free(run->v_old);
+    free(run->debt_old);
+    free(run->wall_before);
+    free(run->v_before);
     free(run->map);
     free(run->out);
     free(run->worker);
     free(run->log);
 }
 
-// silt-dem stands beside the program, or in libexec of the installed tree
-static char *worker_find(const char *asked) {
-    if (asked)
-        return silt_text("%s", asked);
-    char self[4096];
-    const ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-    if (n <= 0)
-        return silt_text("silt-dem");
-    self[n] = 0;
-    char *slash = strrchr(self, '/');
-    *slash = 0;
-    for (int k = 0; k < 3; k++) {
-        char path[4200];
-        snprintf(path, sizeof path, k == 0 ? "%s/silt-dem" : k == 1 ? "%s/../silt-dem" : "%s/../libexec/silt/silt-dem", self);
-        if (access(path, X_OK) == 0)
-            return silt_text("%s", path);
-    }
-    return silt_text("%s/silt-dem", self);
-}
-
-static void run_begin(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out) {
-    *run = (silt_run){.scene = scene, .def = *def};
+static void run_begin(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock) {
+    *run = (silt_run){.scene = scene, .def = *def, .saved_step = -1, .lock = lock};
     run->out = silt_text("%s", out);
     run->log = silt_text("%s/dem.log", out);
-    run->worker = worker_find(def->worker);
+    run->worker = silt_worker_find(def->worker);
     run->started = silt_seconds();
     run->summary.status = "running";
     if (def->threads > 0)
         omp_set_num_threads(def->threads);
     silt_walls_create(&run->walls, scene);
-    run_box(run);
+    silt_run_box(run);
     run->gauge = silt_alloc((size_t)silt_gauges_count(scene) + 1, sizeof *run->gauge);
 }
 
 // ---------------------------------------------------------------- the loop
 
+static double run_end(const silt_run *run) { return run->def.until > 0 ? run->def.until : run->scene->time.end; }
+
 static silt_status run_loop(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
-    const double end = run->def.until > 0 ? run->def.until : scene->time.end;
+    const double end = run_end(run);
     const double every = scene->time.checkpoint > 0 ? scene->time.checkpoint : 10 * scene->time.output;
     const int64_t frames_between = (int64_t)silt_max(1, floor(every / scene->time.output + 0.5));
     silt_status status = SILT_OK;
@@ -553,27 +520,30 @@ static silt_status run_loop(silt_run *run, silt_error *err) {
             silt_progress(&view, end, silt_seconds() - run->started, false);
     }
     // the end of a run is a place to go on from too
-    if (status == SILT_OK && !(run->tick == 0 && run->offset == 0 && run->frame % frames_between == 0))
-        status = checkpoint_write(run, err);
+    return status == SILT_OK ? checkpoint_write(run, err) : status;
+}
 
+// summary and history are closed whatever happened; the first error is the one that is told
+static silt_status run_close(silt_run *run, silt_status status, silt_error *err) {
+    silt_view view;
+    if (status == SILT_FAILED)
+        run_failed(run, err);
     run->summary.status = status == SILT_OK ? "done" : status == SILT_STOPPED ? "stopped" : "failed";
     run->summary.message = status == SILT_OK || !err ? NULL : err->text;
     run->summary.seconds = silt_seconds() - run->started;
     run_view(run, &view);
-    if (!run->def.quiet)
-        silt_progress(&view, end, run->summary.seconds, true);
+    if (!run->def.quiet && run->history)
+        silt_progress(&view, run_end(run), run->summary.seconds, true);
     silt_error late = {0};
-    if (silt_history_close(&run->history, &late) != SILT_OK && status == SILT_OK) {
-        status = late.status;
+    silt_status closed = silt_history_close(&run->history, &late);
+    if (closed == SILT_OK)
+        closed = silt_summary_write(run->out, &view, &run->summary, &late);
+    if (status == SILT_OK && closed != SILT_OK) {
+        status = closed;
         if (err)
             *err = late;
     }
-    late = (silt_error){0};
-    if (silt_summary_write(run->out, &view, &run->summary, &late) != SILT_OK && status == SILT_OK) {
-        status = late.status;
-        if (err)
-            *err = late;
-    }
+    run_free(run);
     return status;
 }
 
@@ -585,120 +555,123 @@ static void signals_catch(void) {
     run_signal = 0;
 }
 
-// an existing folder is refused unless told otherwise; then only what silt wrote is removed
-static silt_status out_prepare(const char *out, bool force, silt_error *err) {
-    if (mkdir(out, 0777) == 0)
-        return SILT_OK;
-    if (errno != EEXIST)
-        return silt_fail(err, SILT_FAILED, "%s: cannot make the output folder: %s", out, strerror(errno));
-    if (!force)
-        return silt_fail(err, SILT_INPUT, "%s: exists already; name another folder with -o, replace it with --force, or go on with: silt resume %s",
-                         out, out);
-    const char *const old[] = {"checkpoint-a.h5", "checkpoint-b.h5", "summary.json", "run.log", "history.csv", "dem.log"};
-    for (size_t k = 0; k < sizeof old / sizeof *old; k++) {
-        char *path = silt_text("%s/%s", out, old[k]);
-        unlink(path);
-        free(path);
-    }
-    return silt_frame_cut(out, -1, err);
-}
-
-// the scene's folder name plus .out, in the current folder
-static char *out_default(const silt_scene *scene) {
-    char *full = realpath(scene->path, NULL);
-    char *slash = full ? strrchr(full, '/') : NULL;
-    if (slash)
-        *slash = 0;
-    const char *name = slash ? strrchr(full, '/') : NULL;
-    char *out = silt_text("%s.out", name && name[1] ? name + 1 : "silt");
-    free(full);
-    return out;
+// the state at t = 0 with its row and frame
+static silt_status run_start(silt_run *run, silt_error *err) {
+    silt_view view;
+    SILT_TRY(silt_verify_copy(run->scene, run->out, err));
+    SILT_TRY(silt_run_first(run, err));
+    SILT_TRY(step_close(run, err));
+    run_view(run, &view);
+    SILT_TRY(silt_gauges_create(&run->gauges, &view, err));
+    SILT_TRY(silt_history_create(&run->history, run->out, run->scene, err));
+    return step_output(run, err);
 }
 
 silt_status silt_scene_run(const silt_scene *scene, const silt_run_def *def, silt_error *err) {
-    silt_run state, *run = &state;
-    char *out = def->out ? silt_text("%s", def->out) : out_default(scene);
-    silt_status status = out_prepare(out, def->force, err);
-    if (status != SILT_OK) {
-        free(out);
-        return status;
+    silt_run run;
+    int lock = -1;
+    char *out = def->out ? silt_text("%s", def->out) : silt_folder_default(scene);
+    silt_status status = silt_folder_prepare(out, def->force, &lock, err);
+    if (status == SILT_OK) {
+        run_begin(&run, scene, def, out, lock);
+        signals_catch();
+        status = run_start(&run, err);
+        if (status == SILT_OK)
+            status = run_loop(&run, err);
+        status = run_close(&run, status, err);
     }
-    run_begin(run, scene, def, out);
     free(out);
-    signals_catch();
-    silt_view view;
-    status = silt_verify_copy(scene, run->out, err);
-    if (status == SILT_OK)
-        status = run_first(run, err);
-    run->dt = 0;
-    if (status == SILT_OK)
-        status = step_close(run, err);
-    run_view(run, &view);
-    if (status == SILT_OK)
-        status = silt_gauges_create(&run->gauges, &view, err);
-    if (status == SILT_OK)
-        status = silt_history_create(&run->history, run->out, scene, err);
-    if (status == SILT_OK)
-        status = step_output(run, err);
-    if (status == SILT_OK)
-        status = run_loop(run, err);
-    run_free(run);
     return status;
 }
 
-// the newest of the two checkpoints that can be read whole
-static silt_status checkpoint_find(const char *out, silt_store **store, int64_t *step, int *slot, silt_error *err) {
-    *store = NULL;
-    *step = -1;
-    silt_error first = {0};
-    for (int k = 0; k < 2; k++) {
-        char *path = silt_text("%s/checkpoint-%c.h5", out, 'a' + k);
-        silt_store *candidate = NULL;
-        int64_t at = -1;
-        silt_error bad = {0};
-        if (silt_store_open(&candidate, path, &bad) == SILT_OK &&
-            silt_store_take(candidate, "run/step", STORE_LONG, 1, &at, &bad) == SILT_OK && at > *step) {
-            silt_store_close(store);
-            *store = candidate;
-            *step = at;
-            *slot = k;
-        } else {
-            silt_store_close(&candidate);
-            if (!first.count)
-                first = bad;
-        }
-        free(path);
+// the step of one of the two checkpoints, -1 when it cannot be read
+static int64_t checkpoint_step(const char *path, silt_error *err) {
+    silt_store *store = NULL;
+    int64_t step = -1;
+    if (silt_store_open(&store, path, err) != SILT_OK || silt_store_take(store, "run/step", STORE_LONG, 1, &step, err) != SILT_OK)
+        step = -1;
+    silt_store_close(&store);
+    return step;
+}
+
+// a line in the log: where the run went on, and what was wrong with a checkpoint that was passed over
+static void resume_log(const silt_run *run, const char *path, const char *other, const char *why) {
+    char *log = silt_text("%s/run.log", run->out);
+    FILE *to = fopen(log, "a");
+    if (to) {
+        fprintf(to, "resumed at step %lld, time %.9g from %s", (long long)run->step, run->time, strrchr(path, '/') + 1);
+        fprintf(to, *why && access(other, F_OK) == 0 ? "; passed over: %s\n" : "\n", why);
+        fclose(to);
     }
-    if (!*store)
-        return silt_fail(err, SILT_FAILED, "%s: no checkpoint to go on from: %s", out, first.text);
-    return SILT_OK;
+    free(log);
+}
+
+// the newest of the two checkpoints that can be read whole
+static silt_status resume_load(silt_run *run, const silt_scene *scene, const silt_run_def *def, int lock, silt_error *err) {
+    char *path[2];
+    int64_t step[2];
+    silt_error why[2] = {{0}};
+    silt_status status = SILT_FAILED;
+    for (int k = 0; k < 2; k++) {
+        path[k] = silt_text("%s/checkpoint-%c.h5", def->out, 'a' + k);
+        step[k] = checkpoint_step(path[k], &why[k]);
+    }
+    for (int turn = 0; turn < 2 && status != SILT_OK; turn++) {
+        const int k = step[1] > step[0];
+        if (step[k] < 0)
+            break;
+        silt_store *store = NULL;
+        run_begin(run, scene, def, def->out, -1);
+        status = silt_store_open(&store, path[k], &why[k]);
+        if (status == SILT_OK)
+            status = silt_run_load(run, store, &why[k]);
+        silt_store_close(&store);
+        if (status != SILT_OK) {
+            run_free(run);
+            step[k] = -1;
+            continue;
+        }
+        run->checkpoint_slot = 1 - k;
+        run->saved_step = run->step;
+        run->saved_time = run->time;
+        run->whole = true;
+        run->lock = lock;
+        resume_log(run, path[k], path[1 - k], why[1 - k].text);
+    }
+    if (status != SILT_OK)
+        silt_fail(err, SILT_FAILED, "%s: no checkpoint to go on from: %s; %s", def->out, why[0].text, why[1].text);
+    free(path[0]);
+    free(path[1]);
+    return status;
 }
 
 silt_status silt_run_resume(const silt_run_def *def, silt_error *err) {
     char *path = silt_text("%s/scene.yaml", def->out);
     silt_scene *scene = NULL;
-    silt_store *store = NULL;
-    int64_t step;
-    int slot = 0;
+    silt_run run;
+    int lock = -1;
     silt_status status = silt_scene_read(path, 0, NULL, &scene, err);
     free(path);
     if (status != SILT_OK)
         return status;
-    silt_run state, *run = &state;
-    run_begin(run, scene, def, def->out);
     signals_catch();
-    status = checkpoint_find(def->out, &store, &step, &slot, err);
+    status = silt_folder_lock(def->out, &lock, err);
     if (status == SILT_OK)
-        status = silt_run_load(run, store, err);
-    silt_store_close(&store);
-    run->checkpoint_slot = 1 - slot;
+        status = resume_load(&run, scene, def, lock, err);
+    if (status != SILT_OK) {
+        if (lock >= 0)
+            close(lock);
+        goto done;
+    }
+    status = silt_frame_cut(run.out, (int)run.frame, err);
     if (status == SILT_OK)
-        status = silt_frame_cut(run->out, (int)run->frame, err);
-    if (status == SILT_OK)
-        status = silt_history_reopen(&run->history, run->out, scene, run->step, err);
-    if (status == SILT_OK)
-        status = run_loop(run, err);
-    run_free(run);
+        status = silt_history_reopen(&run.history, run.out, scene, run.step, err);
+    if (status != SILT_OK) {
+        run_free(&run); // what the folder says of the run before stays
+        goto done;
+    }
+    status = run_close(&run, run_loop(&run, err), err);
+done:
     silt_scene_free(&scene);
     return status;
 }

@@ -56,8 +56,11 @@ struct silt_run {
     // clocks: time = frame * output + offset, with offset = tick * step of the coupling when there is one
     int64_t step, frame, tick;
     double offset, time, dt;
-    int64_t next_checkpoint; // frame at which the next one is due
     int checkpoint_slot;
+    int64_t saved_step; // of the newest checkpoint, -1: none yet
+    double saved_time;
+    bool whole;         // the state is that of the end of a step, nothing of the next one has been done to it
+    int lock;           // descriptor that keeps other runs out of the folder, -1: none
 
     silt_ledger ledger;
     silt_gauges *gauges;
@@ -71,10 +74,19 @@ struct silt_run {
     int n_body_before, body_before_capacity;
     struct silt_body *body_before; // owned, poses at the start of the step
     double *x_old;   // owned, 2 per node, positions at the start of the step
+    double *v_old, *debt_old; // owned, 2 and 1 per node, velocities and debts at the start of the step
+    int *wall_before;  // owned, first wall of every node before contact
+    double *v_before;  // owned, 2 per node
+    int wall_before_capacity, v_before_capacity;
     int *map;        // owned, renumbering of the last rebuild
-    int x_old_capacity, map_capacity;
+    int x_old_capacity, v_old_capacity, debt_old_capacity, map_capacity;
     double box_lo[2], box_hi[2]; // what lies outside has left
 };
+
+// start.c ---------------------------------------------------------------------------------------------
+void silt_run_box(silt_run *run);
+silt_status silt_run_first(silt_run *run, silt_error *err);
+void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def);
 
 // move.c ----------------------------------------------------------------------------------------------
 /** Nodes, inlets, outlets and bodies to their new places, then the new mesh. */
@@ -88,9 +100,17 @@ void silt_run_place(silt_run *run);                // parcels that wait find roo
 silt_status silt_run_deposit(silt_run *run, silt_error *err); // after the grains' step: what comes to rest
 void silt_run_bed_sync(silt_run *run);             // nodes on the bed's surface follow the bed
 
+// folder.c --------------------------------------------------------------------------------------------
+/** Makes the folder, or with force clears an existing one of what silt wrote, and locks it. *lock: descriptor, -1 where the file
+ * system has no locks. Errors: it exists or is in use (SILT_INPUT), it cannot be made (SILT_FAILED). */
+silt_status silt_folder_prepare(const char *out, bool force, int *lock, silt_error *err);
+/** one run at a time in a folder; the lock ends with the process at the latest */
+silt_status silt_folder_lock(const char *out, int *lock, silt_error *err);
+char *silt_folder_default(const silt_scene *scene); // the scene's folder name plus .out, in the current folder; owned by the caller
+char *silt_worker_find(const char *asked);          // path of silt-dem; owned by the caller
+
 // state.c ---------------------------------------------------------------------------------------------
 silt_status silt_run_save(silt_run *run, const char *path, silt_error *err);
 silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err);
-void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def);
 
 #endif

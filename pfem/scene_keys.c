@@ -115,7 +115,7 @@ static const silt_key fluid_rows[] = {
      .doc = "implicitness of the step: 0.5 trapezoidal, 1 backward Euler"},
     {"alpha", KEY_NUMBER, .unit = "h", .fallback = "1.3", .flags = KEY_OPEN_LOW, RANGE(0, 10),
      AT(silt_fluid_def, alpha), .doc = "largest circumradius of a cell that was water a step ago"},
-    {"merge", KEY_NUMBER, .unit = "h", .fallback = "0.25", .flags = KEY_OPEN_LOW, RANGE(0, 10),
+    {"merge", KEY_NUMBER, .unit = "h", .fallback = "0.3", .flags = KEY_OPEN_LOW, RANGE(0, 10),
      AT(silt_fluid_def, merge), .doc = "width of a gap between two surfaces that closes and becomes water"},
     {"tolerance", KEY_NUMBER, .fallback = "1e-6", .flags = KEY_OPEN_LOW | KEY_OPEN_HIGH, RANGE(0, 1),
      AT(silt_fluid_def, tolerance), .doc = "relative residual of the continuity equation"},

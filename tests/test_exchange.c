@@ -924,9 +924,10 @@ static void test_crumbs_fall_like_parcels(void **unused) {
         OK(dem->prepare(b.coupling, &t.nodes, &t.mesh, n * step, &drag, &error));
         assert_non_null(drag);
         dem->load(b.coupling, &t.nodes, &t.mesh, n * step);
-        double grains[2], water[2];
-        dem->exchanged(b.coupling, grains, water);
-        near(grains[1], 9.81 * 1000 / 2650 * usual * 1.001, 1e-9, "force on all grains");
+        silt_exchanged exchanged;
+        dem->exchanged(b.coupling, &exchanged);
+        near(exchanged.grains[1], 9.81 * 1000 / 2650 * usual * 1.001, 1e-9, "force on all grains");
+        near(exchanged.size, exchanged.grains[1], 1e-9, "size of the forces");
         OK(dem->start(b.coupling, n, &error));
         OK(dem->finish(b.coupling, &error));
         time += n * step;

@@ -268,8 +268,11 @@ static void test_gauges(void **state) {
 #define WALLS "wall_mesh,wall_assemble,wall_solve,wall_bed,wall_dem,wall_move,wall_output\n"
 #define WATER                                                                                                          \
     "step,time,dt,n_node,n_cell,fluid_volume,flying_volume,mesh_volume,fluid_mass,volume_error,kinetic_energy,"        \
-    "potential_energy,momentum_x,momentum_y,momentum_z,momentum_error,external_work,dissipation,volume_solved,"        \
+    "potential_energy,momentum_x,momentum_y,momentum_z,momentum_error,external_work,dissipation,max_speed,volume_solved,"        \
     "volume_moved,volume_reconnected,volume_edited,"
+#define GRAIN_FORCES                                                                                                   \
+    "grain_velocity_x,grain_velocity_y,grain_velocity_z,grain_water_x,grain_water_y,grain_water_z,grain_contact_x,"    \
+    "grain_contact_y,grain_contact_z,"
 
 static void test_history_columns(void **state) {
     (void)state;
@@ -290,7 +293,7 @@ static void test_history_columns(void **state) {
     assert_int_equal(silt_history_create(&history, folder, &w.scene, &err), SILT_OK);
     assert_int_equal(silt_history_close(&history, &err), SILT_OK);
     assert_string_equal(content("history.csv"),
-                        WATER "bed_mass,released_mass,deposited_mass,pore_water_mass,grain_count,grain_mass,"
+                        WATER "bed_mass,released_mass,deposited_mass,pore_water_mass,grain_count,grain_mass," GRAIN_FORCES
                               "sediment_error,left_mass,inflow_mass,outflow_mass,block_x,block_y,block_z,block_vx,"
                               "block_vy,block_vz,block_qw,block_qx,block_qy,block_qz,block_wx,block_wy,block_wz,"
                               "block_fx,block_fy,block_fz,block_tx,block_ty,block_tz,block_cx,block_cy,block_cz,"
@@ -301,7 +304,7 @@ static void test_history_columns(void **state) {
     w.scene.n_body = w.scene.n_gauge = 0;
     assert_int_equal(silt_history_create(&history, folder, &w.scene, &err), SILT_OK);
     assert_int_equal(silt_history_close(&history, &err), SILT_OK);
-    assert_string_equal(content("history.csv"), "step,time,dt,grain_count,grain_mass,sediment_error,left_mass," WALLS);
+    assert_string_equal(content("history.csv"), "step,time,dt,grain_count,grain_mass," GRAIN_FORCES "sediment_error,left_mass," WALLS);
     silt_locator_clear(&w.locator);
 }
 

@@ -194,8 +194,8 @@ static void test_whole(void **state) {
     assert_true(s->gravity[0] == 0 && s->gravity[1] == -9.81 && s->gravity[2] == 0);
     const silt_fluid_def *f = &s->fluid;
     assert_true(f->on && f->density == 1000 && f->viscosity == 0.001 && f->size == 0.02);
-    assert_true(f->scheme == SCHEME_FRACTIONAL && f->pressure == PRESSURE_CONSISTENT && f->theta == 1);
-    assert_true(f->alpha == 1.3 && f->merge == 0.25 && f->tolerance == 1e-6 && f->iterations == 12);
+    assert_true(f->scheme == SCHEME_FRACTIONAL && f->pressure == PRESSURE_CONSISTENT && f->theta == 0.55);
+    assert_true(f->alpha == 1.3 && f->merge == 0.3 && f->tolerance == 1e-6 && f->iterations == 12);
     assert_true(f->volume_control && f->volume_steps == 15 && f->jitter == 0 && f->seed == 1);
     assert_int_equal(f->n_region, 3);
     assert_int_equal(f->region[0].kind, REGION_BOX);

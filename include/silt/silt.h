@@ -27,7 +27,7 @@ typedef enum silt_status {
 /** A complete message, written at the place of knowledge. Callers pass it up, they add nothing. */
 typedef struct silt_error {
     silt_status status;
-    char text[4096]; /**< the message(s), one per line group, ready to print; several scene errors stand in it in a row */
+    char text[16384]; /**< the message(s), one per line group, ready to print; several scene errors stand in it in a row */
     int count;       /**< how many errors are in text */
 } silt_error;
 

@@ -1,0 +1,119 @@
+// the state at t = 0: box of the scene, bed, bodies, the cloud of nodes and the first mesh
+#include "run.h"
+
+static bool run_solid(const void *context, const double x[2], double margin) {
+    const silt_barrier *barrier = context;
+    if (barrier->bed) {
+        if (silt_bed_contains(barrier->bed, x))
+            return true;
+        for (int k = 0; k < barrier->bed->n_node; k++)
+            if (barrier->bed->exposed[k] && hypot(barrier->bed->x[k][0] - x[0], barrier->bed->x[k][1] - x[1]) < margin)
+                return true;
+    }
+    const silt_barrier bodies = {.bodies = barrier->bodies};
+    if (silt_barrier_contains(&bodies, x))
+        return true;
+    for (int k = 0; margin > 0 && barrier->bodies && k < 8; k++) {
+        const double probe[2] = {x[0] + margin * cos(k * M_PI / 4), x[1] + margin * sin(k * M_PI / 4)};
+        if (silt_barrier_contains(&bodies, probe))
+            return true;
+    }
+    return false;
+}
+
+void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def) {
+    *def = (silt_coupling_def){.scene = run->scene, .walls = &run->walls, .bed = run->scene->bed.on ? &run->bed : NULL,
+                               .worker = run->worker, .log = run->log};
+    memcpy(def->lo, run->box_lo, sizeof def->lo);
+    memcpy(def->hi, run->box_hi, sizeof def->hi);
+}
+
+// everything that walls, regions and bodies span, and room for splashes
+void silt_run_box(silt_run *run) {
+    const silt_scene *scene = run->scene;
+    double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL};
+#define SPAN(px, py)                                                                                                   \
+    do {                                                                                                               \
+        const double span_[2] = {(px), (py)};                                                                          \
+        for (int d_ = 0; d_ < 2; d_++) {                                                                               \
+            lo[d_] = silt_min(lo[d_], span_[d_]);                                                                      \
+            hi[d_] = silt_max(hi[d_], span_[d_]);                                                                      \
+        }                                                                                                              \
+    } while (0)
+    for (int s = 0; s < run->walls.count; s++) {
+        SPAN(run->walls.from[s][0], run->walls.from[s][1]);
+        SPAN(run->walls.to[s][0], run->walls.to[s][1]);
+    }
+    const silt_region *lists[2] = {scene->fluid.region, scene->bed.region};
+    const int counts[2] = {scene->fluid.n_region, scene->bed.n_region};
+    for (int l = 0; l < 2; l++)
+        for (int r = 0; r < counts[l]; r++) {
+            const silt_region *region = &lists[l][r];
+            if (region->kind == REGION_BOX) {
+                SPAN(region->lo[0], region->lo[1]);
+                SPAN(region->hi[0], region->hi[1]);
+            } else if (region->kind == REGION_CIRCLE) {
+                SPAN(region->centre[0] - region->radius, region->centre[1] - region->radius);
+                SPAN(region->centre[0] + region->radius, region->centre[1] + region->radius);
+            }
+            for (int k = 0; k < region->n_point; k++)
+                SPAN(region->point[3 * k], region->point[3 * k + 1]);
+        }
+    for (int b = 0; b < scene->n_body; b++) {
+        const double reach = silt_max(scene->body[b].scale, scene->body[b].height);
+        SPAN(scene->body[b].at[0] - reach, scene->body[b].at[1] - reach);
+        SPAN(scene->body[b].at[0] + reach, scene->body[b].at[1] + reach);
+    }
+    for (int k = 0; k < scene->grains.n_grain; k++) {
+        const silt_grain_def *grain = &scene->grains.grain[k];
+        SPAN(grain->at[0] - grain->diameter, grain->at[1] - grain->diameter);
+        SPAN(grain->at[0] + grain->diameter, grain->at[1] + grain->diameter);
+    }
+#undef SPAN
+    for (int d = 0; d < 2; d++) {
+        const double margin = 0.5 * silt_max(hi[0] - lo[0], hi[1] - lo[1]);
+        run->box_lo[d] = lo[d] - margin;
+        run->box_hi[d] = hi[d] + margin;
+    }
+}
+
+silt_status silt_run_first(silt_run *run, silt_error *err) {
+    const silt_scene *scene = run->scene;
+    if (scene->bed.on)
+        SILT_TRY(silt_bed_create(&run->bed, scene, err));
+    run->bed_revision = run->bed.revision;
+    if (silt_scene_has_dem(scene)) {
+        silt_coupling_def def;
+        silt_coupling_def_fill(run, &def);
+        SILT_TRY(silt_coupling_dem.open(&run->coupling, &def, err));
+        run->barrier.bodies = silt_coupling_dem.bodies(run->coupling);
+    }
+    if (scene->bed.on)
+        run->barrier.bed = &run->bed;
+    run->barrier.walls = &run->walls;
+    if (!scene->fluid.on)
+        return SILT_OK;
+
+    // bodies and bed first: the water keeps its distance
+    for (int b = 0; run->barrier.bodies && b < run->barrier.bodies->count; b++) {
+        const struct silt_body *body = &run->barrier.bodies->body[b];
+        const double c = 1 - 2 * silt_square(body->q[3]), s = 2 * body->q[0] * body->q[3];
+        const int n = silt_coupling_dem.outline(run->coupling, b, scene->fluid.size, NULL, 0);
+        double *point = silt_alloc(2 * (size_t)n + 2, sizeof *point);
+        silt_coupling_dem.outline(run->coupling, b, scene->fluid.size, point, n);
+        for (int k = 0; k < n; k++) {
+            const double x[2] = {body->x[0] + c * point[2 * k] - s * point[2 * k + 1],
+                                 body->x[1] + s * point[2 * k] + c * point[2 * k + 1]};
+            silt_nodes_add(&run->nodes, NODE_BODY, b, x);
+        }
+        free(point);
+    }
+    for (int k = 0; k < run->bed.n_node; k++)
+        if (run->bed.exposed[k])
+            run->bed.fluid_node[k] = silt_nodes_add(&run->nodes, NODE_BED, k, run->bed.x[k]);
+    silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
+    SILT_TRY(silt_mesh_first(&run->mesh, &run->nodes, scene, &run->barrier, err));
+    // nodes of the cloud that got no cell at the start are no drops: they hold no water
+    silt_locator_build(&run->locator, &run->mesh, run->nodes.x, scene->fluid.size);
+    return SILT_OK;
+}
