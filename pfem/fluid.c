@@ -537,7 +537,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_scene *scene, const s
             memcpy(f->w, f->star, 2 * (size_t)f->n_node * sizeof(double));
             return SILT_OK;
         }
-        if (f->iterations == def->iterations && debts_relent(f))
+        if (f->iterations >= def->iterations && f->iterations % 4 == 0 && debts_relent(f))
             continue;
         if (f->iterations >= 3 * def->iterations || (f->iterations > 3 && f->worst > 10 * before && f->worst > 0.1))
             return silt_fail(err, SILT_FAILED,

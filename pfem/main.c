@@ -113,6 +113,7 @@ static error_t main_option(int key, char *text, struct argp_state *state) {
 static silt_status main_check(const main_arguments *a, silt_error *err) {
     silt_scene *scene = NULL;
     SILT_TRY(silt_scene_read(a->path, a->n_set, a->set, &scene, err));
+    silt_scene_warn(scene, stderr);
     printf("%s: ok\n", a->path);
     silt_scene_free(&scene);
     return SILT_OK;
@@ -121,6 +122,7 @@ static silt_status main_check(const main_arguments *a, silt_error *err) {
 static silt_status main_run(const main_arguments *a, silt_error *err) {
     silt_scene *scene = NULL;
     SILT_TRY(silt_scene_read(a->path, a->n_set, a->set, &scene, err));
+    silt_scene_warn(scene, stderr);
     silt_status status = silt_scene_run(scene, &a->run, err);
     silt_scene_free(&scene);
     return status;

@@ -86,7 +86,6 @@ static void place_bodies(silt_run *run) {
 // water that crossed an outlet, or left the box of the scene
 static void let_out(silt_run *run) {
     silt_nodes *nodes = &run->nodes;
-    const double rho = run->scene->fluid.density;
     for (int i = 0; i < nodes->count; i++) {
         if (nodes->kind[i] != NODE_FLUID || run->memory.dead[i])
             continue;
@@ -102,13 +101,7 @@ static void let_out(silt_run *run) {
         }
         if (!gone)
             continue;
-        // it takes its share of its cells along, and what it owed
-        double share = 0;
-        for (int k = i < run->mesh.n_node ? run->mesh.node_cell_start[i] : 0; i < run->mesh.n_node && k < run->mesh.node_cell_start[i + 1]; k++)
-            share += run->memory.area[run->mesh.node_cell[k]] / 3;
-        run->ledger.outflow_mass += rho * (share + nodes->debt[i]);
-        nodes->debt[i] = -share;
-        run->memory.dead[i] = 1;
+        run->memory.dead[i] = NODE_LEFT;
     }
 }
 
@@ -277,6 +270,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     SILT_RESERVE(run->map, run->map_capacity, nodes->count + 1);
     SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
     run->ledger.volume_reconnected += run->memory.reconnected;
+    run->ledger.outflow_mass += rho * run->memory.left;
     for (int k = 0; k < run->bed.n_node; k++)
         if (run->bed.fluid_node[k] >= 0)
             run->bed.fluid_node[k] = run->map[run->bed.fluid_node[k]];

@@ -98,5 +98,7 @@ silt_status silt_verify(const char *out, FILE *to, silt_error *err);
 /** PNG pictures of frames: frame -1 all, -2 the last; field: mesh, pressure, speed, porosity, bed. Written as OUT/picture_NNNNNN.png */
 silt_status silt_draw(const char *out, int frame, const char *field, const char *to, FILE *say, silt_error *err);
 silt_status silt_info(const char *path, FILE *to, silt_error *err);
+/** warn.c: prints what is allowed but probably not meant, a line each; @return how many */
+int silt_scene_warn(const silt_scene *scene, FILE *to);
 
 #endif

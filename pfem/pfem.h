@@ -99,6 +99,7 @@ double silt_mesh_volume(const silt_mesh *mesh, const double *x);
 
 /** What was water before a rebuild, and what was done to the cloud since: the rebuild's memory (remesh.c). Node numbers are
  * those of the cloud with dead nodes still in place and new ones appended. */
+#define NODE_LEFT 2
 typedef struct silt_memory {
     int n_cell, cell_capacity, area_capacity;
     int (*cell)[3];   // owned, cells that were water: the old mesh, and bed cells that became water
@@ -108,9 +109,10 @@ typedef struct silt_memory {
     double *taken_area; // owned, m2
     int n_node, flag_capacity, dead_capacity;
     uint8_t *interior; // owned, one per node: had cells and no free edge
-    uint8_t *dead;     // owned, one per node: leaves the cloud at the rebuild
+    uint8_t *dead;     // owned, one per node: leaves the cloud at the rebuild; NODE_LEFT: takes its water out of the domain
     int n_added, n_removed; // by refinement, of the last step
     double reconnected;     // m3, volume that the rebuild itself made (positive) or lost
+    double left;            // m3, volume that went with the nodes that left
 } silt_memory;
 void silt_memory_clear(silt_memory *memory);
 /** Takes down the present mesh with its areas at positions x (before the cloud is edited). */

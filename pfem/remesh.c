@@ -307,7 +307,6 @@ static void book_volume(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *m
                 nodes->debt[mesh->cell[e][a]] -= moved / 3;
         }
     }
-    memory->reconnected = made;
 
     // debts of nodes that left or came back go into their group; a node that flies off takes its share
     for (int i = 0; i < n; i++) {
@@ -322,6 +321,15 @@ static void book_volume(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *m
             touched[i] = 1;
         }
     }
+    // where nodes left the domain, what is missing left with them
+    memory->left = 0;
+    for (int i = 0; i < n; i++)
+        if (memory->dead[i] == NODE_LEFT) {
+            const int g = group_find(parent, i);
+            memory->left += sum[g];
+            sum[g] = 0;
+        }
+    memory->reconnected = made + memory->left;
     for (int i = 0; i < n; i++)
         if (touched[i] && wet[i] && !memory->dead[i])
             members[group_find(parent, i)]++;
