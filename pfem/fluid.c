@@ -297,12 +297,15 @@ static silt_status momentum_implicit(silt_fluid *f, const silt_scene *scene, con
     add_viscous(f, mesh, mu, v, -1, r);
     double rz = 0, scale = 0;
     for (int i = 0; i < f->n_node; i++) {
+        // what walls hold is no measure of what is solved for
+        double loose[2] = {right[2 * i], right[2 * i + 1]};
+        project(f, i, loose);
         project(f, i, r + 2 * i);
         for (int d = 0; d < 2; d++) {
             const int k = 2 * i + d;
             s[k] = r[k] / diagonal[i];
             rz += r[k] * s[k];
-            scale += silt_square(right[k]) / diagonal[i];
+            scale += silt_square(loose[d]) / diagonal[i];
         }
     }
     const double target = 1e-24 * scale;
@@ -589,7 +592,8 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_scene *scene, const silt_w
 
     double *p = silt_alloc((size_t)f->n_node + 1, sizeof *p); // kept apart until the step is accepted
     for (int i = 0; i < f->n_node; i++)
-        p[i] = mesh->wet[i] ? nodes->p[i] : 0;
+        // with the Laplacian the surface's pressure is prescribed
+        p[i] = mesh->wet[i] && !(scene->fluid.pressure == PRESSURE_LAPLACIAN && mesh->surface[i]) ? nodes->p[i] : 0;
     const silt_status status = mesh->n_cell ? fluid_iterate(f, scene, nodes, mesh, drag, dt, p, err) : SILT_OK;
     if (status == SILT_OK) {
         reactions(f, scene, nodes, mesh, drag, dt, p);

@@ -1,9 +1,9 @@
 // frames: fluid, bed, grains and bodies as VTKHDF files, their .series indices, run.h5 and run.log
 
+#include "image.h"
 #include "output.h"
 
 #include <errno.h>
-#include <hdf5.h>
 #include <unistd.h>
 
 // cell types of VTK
@@ -17,8 +17,7 @@ enum { FRAME_FLUID, FRAME_BED, FRAME_GRAINS, FRAME_BODIES, FRAME_PARTS };
 typedef struct frame_file {
     char *path, *part; // owned, final name and the name while it is written
     hid_t file, root, point, cell;
-    bool bad;   // some call failed; frame_close reports
-    int reason; // errno of the creation
+    bool bad; // some call failed; frame_close reports
 } frame_file;
 
 // rows x columns values; columns 0: a list of single values
@@ -51,12 +50,7 @@ static void frame_open(frame_file *f, const char *out, const char *part, int num
     memset(f, 0, sizeof *f);
     f->path = silt_text("%s/%s_%06d.hdf", out, part, number);
     f->part = silt_text("%s.part", f->path);
-    hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-    H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
-    errno = 0;
-    f->file = H5Fcreate(f->part, H5F_ACC_TRUNC, H5P_DEFAULT, access);
-    f->reason = f->file < 0 ? errno : 0;
-    H5Pclose(access);
+    f->file = silt_image_create(f->part);
     f->root = H5Gcreate2(f->file, "VTKHDF", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
     f->point = H5Gcreate2(f->root, "PointData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
     f->cell = H5Gcreate2(f->root, "CellData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
@@ -92,13 +86,10 @@ static void frame_grid(frame_file *f, int n_point, const double *x, int n_cell, 
 // closes and renames into place; a file that failed is removed
 static silt_status frame_close(frame_file *f, silt_error *err) {
     silt_status status = SILT_OK;
-    errno = 0;
-    if (f->file >= 0) {
-        f->bad |= H5Fflush(f->file, H5F_SCOPE_GLOBAL) < 0;
-        f->bad |= H5Fclose(f->file) < 0;
-    }
-    if (f->bad || rename(f->part, f->path) != 0) {
-        int reason = f->reason ? f->reason : errno;
+    int reason = silt_image_write(f->file, f->part, false);
+    if (!reason && !f->bad && rename(f->part, f->path) != 0)
+        reason = errno;
+    if (reason || f->bad) {
         status = silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", f->part,
                            reason ? strerror(reason) : "HDF5 refused");
         unlink(f->part);
@@ -320,8 +311,10 @@ static silt_status frame_list_write(const frame_list *list, const char *out, con
                     list->entry[i].time, i + 1 < list->n ? "," : "");
         fprintf(to, "  ]\n}\n");
     }
-    if (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0)
+    if (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0) {
         status = silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path, strerror(errno));
+        unlink(aside);
+    }
     if (to)
         fclose(to);
     free(aside);
@@ -333,8 +326,7 @@ static silt_status frame_list_write(const frame_list *list, const char *out, con
 static silt_status frame_links(const frame_list *list, const bool has[FRAME_PARTS], const char *out, silt_error *err) {
     char *path = silt_text("%s/run.h5", out), *aside = silt_text("%s.part", path);
     silt_status status = SILT_OK;
-    errno = 0;
-    hid_t file = H5Fcreate(aside, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    hid_t file = silt_image_create(aside);
     hid_t frames = H5Gcreate2(file, "frames", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
     bool bad = frames < 0;
     for (int i = 0; i < list->n && !bad; i++) {
@@ -350,10 +342,13 @@ static silt_status frame_links(const frame_list *list, const bool has[FRAME_PART
     }
     if (frames >= 0)
         H5Gclose(frames);
-    bad |= file < 0 || H5Fclose(file) < 0;
-    if (bad || rename(aside, path) != 0)
-        status =
-            silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path, errno ? strerror(errno) : "HDF5 refused");
+    int reason = silt_image_write(file, aside, false);
+    if (!reason && !bad && rename(aside, path) != 0)
+        reason = errno;
+    if (reason || bad) {
+        status = silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path, reason ? strerror(reason) : "HDF5 refused");
+        unlink(aside);
+    }
     free(aside);
     free(path);
     return status;

@@ -322,11 +322,36 @@ static void load_bodies(silt_run *run, double before) {
     run->n_body_before = bodies->count;
 }
 
+// a run that has lost its footing says so: steps that shrink without end, water that multiplies or vanishes
+static silt_status step_sane(const silt_run *run, double wanted, silt_error *err) {
+    const silt_scene *scene = run->scene;
+    const silt_nodes *nodes = &run->nodes;
+    if (!scene->fluid.on)
+        return SILT_OK;
+    const double g = hypot(scene->gravity[0], scene->gravity[1]);
+    const double usual = silt_min(scene->time.output, g > 0 ? scene->time.cfl * sqrt(scene->fluid.size / g) : HUGE_VAL);
+    if (wanted < 1e-7 * usual) {
+        int k = 0;
+        for (int i = 0; i < nodes->count; i++)
+            if (hypot(nodes->v[2 * i], nodes->v[2 * i + 1]) > hypot(nodes->v[2 * k], nodes->v[2 * k + 1]))
+                k = i;
+        return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s: a speed of %.3g m/s at (%g, %g) asks for steps of %.3g s; the run has lost its footing",
+                         (long long)run->step + 1, run->time, hypot(nodes->v[2 * k], nodes->v[2 * k + 1]), nodes->x[2 * k],
+                         nodes->x[2 * k + 1], wanted);
+    }
+    if (fabs(run->ledger.volume_error) > 0.5)
+        return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s: the water's volume is off by %.0f %%; no result after this is worth having",
+                         (long long)run->step + 1, run->time, 100 * run->ledger.volume_error);
+    return SILT_OK;
+}
+
 static silt_status run_step(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     memset(run->phase, 0, sizeof run->phase);
     const double before = run->dt;
-    int64_t n = step_choose(run, step_wanted(run));
+    const double wanted = step_wanted(run);
+    SILT_TRY(step_sane(run, wanted, err));
+    int64_t n = step_choose(run, wanted);
 
     SILT_RESERVE(run->x_old, run->x_old_capacity, 2 * run->nodes.count + 2);
     memcpy(run->x_old, run->nodes.x, 2 * (size_t)run->nodes.count * sizeof(double));

@@ -1,10 +1,10 @@
 // checkpoints: named arrays in an HDF5 file that is written aside and renamed into place when it is whole
 
+#include "image.h"
 #include "pfem.h"
 
 #include <errno.h>
 #include <fcntl.h>
-#include <hdf5.h>
 #include <libgen.h>
 #include <unistd.h>
 
@@ -44,12 +44,13 @@ silt_status silt_store_create(silt_store **store, const char *path, silt_error *
     silt_store *s = silt_alloc(1, sizeof *s);
     s->path = silt_text("%s", path);
     s->part = silt_text("%s.part", path);
-    hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-    H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
-    s->file = H5Fcreate(s->part, H5F_ACC_TRUNC, H5P_DEFAULT, access);
-    H5Pclose(access);
+    // a folder that takes no file is found out before all the work
+    int fd = open(s->part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    int reason = fd < 0 ? errno : 0;
+    if (fd >= 0)
+        close(fd);
+    s->file = reason ? -1 : silt_image_create(s->part);
     if (s->file < 0) {
-        int reason = errno;
         silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", s->part, reason ? strerror(reason) : "HDF5 refused");
         silt_store_close(&s);
         return SILT_FAILED;
@@ -58,14 +59,13 @@ silt_status silt_store_create(silt_store **store, const char *path, silt_error *
     return SILT_OK;
 }
 
-// makes the file's bytes, or a folder's entries, survive a power cut
-static int store_sync(const char *path) {
-    int fd = open(path, O_RDONLY);
-    if (fd < 0)
-        return -1;
-    int result = fsync(fd);
-    close(fd);
-    return result;
+// makes a folder's entries survive a power cut: best effort, some file systems refuse to sync a folder
+static void store_sync(const char *folder) {
+    int fd = open(folder, O_RDONLY | O_CLOEXEC);
+    if (fd >= 0) {
+        fsync(fd);
+        close(fd);
+    }
 }
 
 silt_status silt_store_commit(silt_store **store, silt_error *err) {
@@ -76,13 +76,10 @@ silt_status silt_store_commit(silt_store **store, silt_error *err) {
         silt_fail(err, SILT_FAILED, "%s: not kept, because it is not whole", s->path);
         goto done;
     }
-    errno = 0;
-    bool whole = H5Fflush(s->file, H5F_SCOPE_GLOBAL) >= 0;
-    whole = H5Fclose(s->file) >= 0 && whole;
+    int reason = silt_image_write(s->file, s->part, true);
     s->file = -1;
-    if (!whole || store_sync(s->part) != 0) {
-        silt_fail(err, SILT_FAILED, "%s: cannot be written to the end (%s)", s->part,
-                  errno ? strerror(errno) : "HDF5 refused");
+    if (reason) {
+        silt_fail(err, SILT_FAILED, "%s: cannot be written to the end (%s)", s->part, strerror(reason));
         goto done;
     }
     if (rename(s->part, s->path) != 0) {
@@ -91,7 +88,6 @@ silt_status silt_store_commit(silt_store **store, silt_error *err) {
     }
     free(s->part);
     s->part = NULL;
-    // the rename itself: best effort, some file systems refuse to sync a folder
     store_sync(dirname(folder));
     status = SILT_OK;
 done:

@@ -109,8 +109,10 @@ silt_status silt_summary_write(const char *out, const silt_view *view, const sil
     FILE *to = fopen(aside, "w");
     if (to)
         summary_print(to, view, summary, check);
-    if (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0)
+    if (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0) {
         status = silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path, strerror(errno));
+        unlink(aside);
+    }
     if (to)
         fclose(to);
     free(check);

@@ -28,11 +28,11 @@ fail() {
 
 # expect CODE COMMAND...: runs it, its words go to $work/last.say
 expect() {
-    wanted=$1
+    expected=$1
     shift
     code=0
     "$@" >"$work/last.say" 2>&1 || code=$?
-    [ "$code" -eq "$wanted" ] || fail "exit code $code instead of $wanted: $*"
+    [ "$code" -eq "$expected" ] || fail "exit code $code instead of $expected: $*"
 }
 
 # says PATTERN: the last command said so
@@ -60,7 +60,7 @@ children() {
 # finish: waits for what was launched; sets code
 finish() {
     code=0
-    wait "$pid" || code=$?
+    wait "$pid" 2>/dev/null || code=$?
 }
 
 # rows OUT: whole rows of history.csv, without its header
@@ -80,7 +80,7 @@ until_rows() {
     done
 }
 
-# until_step_saved OUT STEP: waits until a checkpoint was written behind that row
+# until_saved OUT N: waits until there are a checkpoint and N rows
 until_saved() {
     while [ ! -e "$1/checkpoint-a.h5" ] || [ "$(rows "$1")" -lt "$2" ]; do
         alive "$pid" || fail "the run ended before it had a checkpoint and $2 rows"
