@@ -242,7 +242,9 @@ static void worker_answer_bodies(void) {
     for (int b = 0; b < worker.n_body; b++) {
         for (int c = 0; c < 3; c++)
             body[b].omega[c] /= body[b].inertia;
-        body[b].present = worker_find(worker.body_first[b] + 1) >= 0;
+        // LIGGGHTS drops a body when its centroid has left, and its spheres one by one: no axis came then
+        const double *axis = body[b].axis;
+        body[b].present = worker_find(worker.body_first[b] + 1) >= 0 && axis[0] * axis[0] + axis[1] * axis[1] > 0;
     }
 }
 

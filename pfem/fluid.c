@@ -27,6 +27,7 @@ void silt_fluid_clear(silt_fluid *fluid) {
     free(fluid->increment);
     free(fluid->hold);
     free(fluid->mobile);
+    free(fluid->withheld);
     free(fluid->normal);
     free(fluid->tau);
     for (int k = 0; k < 3; k++)
@@ -61,6 +62,7 @@ static void fluid_reserve(silt_fluid *f, int n_node, int n_cell) {
         ROOM(increment, 1, have_nodes, need);
         ROOM(hold, 1, have_nodes, need);
         ROOM(mobile, 1, have_nodes, need);
+        ROOM(withheld, 1, have_nodes, need);
         for (int k = 0; k < 3; k++)
             ROOM(cg[k], 2, have_nodes, need);
         f->node_capacity = need;
@@ -295,9 +297,8 @@ static silt_status momentum_implicit(silt_fluid *f, const silt_scene *scene, con
     for (int k = 0; k < 2 * f->n_node; k++)
         r[k] = right[k] - f->inertia[k / 2] * v[k];
     add_viscous(f, mesh, mu, v, -1, r);
-    double rz = 0, scale = 0;
+    double rz = 0, scale = 0, whole = 0;
     for (int i = 0; i < f->n_node; i++) {
-        // what walls hold is no measure of what is solved for
         double loose[2] = {right[2 * i], right[2 * i + 1]};
         project(f, i, loose);
         project(f, i, r + 2 * i);
@@ -306,9 +307,11 @@ static silt_status momentum_implicit(silt_fluid *f, const silt_scene *scene, con
             s[k] = r[k] / diagonal[i];
             rz += r[k] * s[k];
             scale += silt_square(loose[d]) / diagonal[i];
+            whole += silt_square(right[k]) / diagonal[i];
         }
     }
-    const double target = 1e-24 * scale;
+    // what walls hold is no measure of what is solved for, only of its rounding
+    const double target = silt_max(1e-24 * scale, 1e-30 * whole);
     f->momentum_iterations = 0;
     while (rz > target) {
         if (++f->momentum_iterations > FLUID_CG_LIMIT)
@@ -339,10 +342,13 @@ static silt_status momentum_implicit(silt_fluid *f, const silt_scene *scene, con
     return SILT_OK;
 }
 
-// residual of continuity: G^T v + L p + Q pi - source - rate
+// residual of continuity: G^T v + L p + Q pi - source - rate; where no velocity can mend it, of its smoothing alone
 static void continuity(silt_fluid *f, const silt_mesh *mesh, const silt_drag *drag, const double *v, const double *p) {
-    for (int j = 0; j < f->n_node; j++)
-        f->residual[j] = -f->rate[j] - (drag ? drag->source[j] : 0);
+    for (int j = 0; j < f->n_node; j++) {
+        const double asked = -f->rate[j] - (drag ? drag->source[j] : 0);
+        f->residual[j] = f->mobile[j] == 1 ? asked : 0;
+        f->withheld[j] = f->mobile[j] == 1 ? 0 : asked;
+    }
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
         double divergence = 0, carried[2] = {0, 0}, flux[2];
@@ -357,10 +363,14 @@ static void continuity(silt_fluid *f, const silt_mesh *mesh, const silt_drag *dr
                 slope += p[cell[a]] * f->grad[e][a][d];
                 mean += f->projection[2 * cell[a] + d] / 3;
             }
-            flux[d] = f->tau[e] * (slope + mean) + carried[d];
+            flux[d] = f->tau[e] * (slope + mean);
         }
-        for (int a = 0; a < 3; a++)
-            f->residual[cell[a]] += f->area[e] * (divergence / 3 + f->grad[e][a][0] * flux[0] + f->grad[e][a][1] * flux[1]);
+        for (int a = 0; a < 3; a++) {
+            const double *grad = f->grad[e][a];
+            const double gain = f->area[e] * (divergence / 3 + grad[0] * carried[0] + grad[1] * carried[1]);
+            f->residual[cell[a]] += f->area[e] * (grad[0] * flux[0] + grad[1] * flux[1]);
+            *(f->mobile[cell[a]] == 1 ? &f->residual[cell[a]] : &f->withheld[cell[a]]) += gain;
+        }
     }
 }
 
@@ -425,6 +435,34 @@ static bool debts_relent(silt_fluid *f) {
             f->rate[i] = 0;
             any = true;
         }
+    return any;
+}
+
+// Water hemmed in between bed, walls, bodies and grains may have no velocity that keeps its volume, and then its pressure
+// means nothing: such a node takes that of its surroundings, and what it gains is owed; at last also a node that is free,
+// a crumpled drop, when it is little. @return whether there was any
+static bool pockets_relent(silt_fluid *f, const silt_mesh *mesh, bool last, double limit, double dt, double *p) {
+    bool any = false;
+    for (int i = 0; i < f->n_node; i++) {
+        if (!mesh->wet[i] || f->mobile[i] != 1 || fabs(f->residual[i]) * dt <= limit * f->volume[i])
+            continue;
+        double sum = 0;
+        int held = 0, count = 0;
+        for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++) {
+            const int j = mesh->neighbour[k];
+            held += f->hold[j] > 0;
+            if (j != i && f->mobile[j] == 1) {
+                sum += p[j];
+                count++;
+            }
+        }
+        const bool little = last && fabs(f->residual[i]) * dt < 20 * limit * f->volume[i];
+        if (2 * held <= mesh->neighbour_start[i + 1] - mesh->neighbour_start[i] && !little)
+            continue;
+        f->mobile[i] = 2;
+        p[i] = count ? sum / count : 0;
+        any = true;
+    }
     return any;
 }
 
@@ -525,7 +563,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_scene *scene, const s
         for (int j = 0; j < f->n_node; j++) {
             if (!mesh->wet[j])
                 continue;
-            const double held = (!consistent && mesh->surface[j]) || !f->mobile[j] ? 0 : fabs(f->residual[j]) * dt / f->volume[j];
+            const double held = (!consistent && mesh->surface[j]) || f->mobile[j] != 1 ? 0 : fabs(f->residual[j]) * dt / f->volume[j];
             if (held > f->worst || !isfinite(held)) {
                 f->worst = held;
                 worst_node = j;
@@ -541,6 +579,10 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_scene *scene, const s
             return SILT_OK;
         }
         if (f->iterations >= def->iterations && f->iterations % 4 == 0 && debts_relent(f))
+            continue;
+        // only when the residual stands still, and it is no small matter
+        if (f->iterations > def->iterations && f->iterations % 4 == 2 && f->worst > 0.9 * before &&
+            pockets_relent(f, mesh, f->iterations >= 2 * def->iterations, silt_max(1e3 * def->tolerance, 1e-4), dt, p))
             continue;
         if (f->iterations >= 3 * def->iterations || (f->iterations > 3 && f->worst > 10 * before && f->worst > 0.1))
             return silt_fail(err, SILT_FAILED,
@@ -601,7 +643,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_scene *scene, const silt_w
         for (int i = 0; i < f->n_node; i++) {
             nodes->p[i] = p[i];
             f->solved_volume += f->residual[i] * dt;
-            nodes->debt[i] -= f->rate[i] * dt;
+            nodes->debt[i] -= (f->rate[i] + (f->mobile[i] == 2 ? f->withheld[i] : 0)) * dt;
             f->given_back += f->rate[i] * dt;
             if (!mesh->wet[i])
                 continue;

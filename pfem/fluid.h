@@ -24,7 +24,8 @@ typedef struct silt_fluid {
     double *projection, *projection_weight;    // owned, pressure gradient projection (2 per node) and its weight
     double *residual, *rate, *increment;       // owned, 1 per node
     uint8_t *hold;        // owned, 0 free, 1 normal velocity held, 2 both held
-    uint8_t *mobile;      // owned, 1: some neighbour or the node itself can move
+    uint8_t *mobile;      // owned, 1: some neighbour or the node itself can move; 2: but not so that its volume is kept
+    double *withheld;     // owned, per node, m3/s: gain that continuity does not see where mobile is not 1
     double *normal;       // owned, 2 per node, where hold is 1
     double *cg[3];        // owned, 2 per node, momentum solver
     double (*tau);        // owned, per cell, stabilisation

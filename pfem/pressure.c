@@ -231,8 +231,8 @@ silt_status silt_pressure_factor(silt_pressure *p, const silt_scene *scene, cons
             value[k] = p->row[index[k]];
         if (!mesh->wet[j])
             *diagonal = 1;
-        else if (p->pinned[j])
-            *diagonal *= 2;
+        else
+            *diagonal *= p->pinned[j] ? 2 : 1 + 1e-9; // a crumb between held nodes knows its pressure up to a constant too
         if (!consistent && mesh->surface[j]) // pressure increment prescribed on the free surface
             *diagonal += 1e12 * fabs(*diagonal);
         // clear what this column touched

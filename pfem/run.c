@@ -109,7 +109,11 @@ static void ledger_take(silt_run *run) {
             ledger->grain_mass = sum;
         }
         int64_t count;
+        const double left = ledger->left_mass;
         silt_coupling_dem.left(run->coupling, &ledger->left_mass, &count);
+        // what left the mesh was water and what it carried
+        if (scene->bed.on)
+            ledger->outflow_mass -= rho * (ledger->left_mass - left) / scene->bed.density;
     }
     if (run->step == 0) {
         ledger->initial_volume = ledger->fluid_volume;
@@ -354,7 +358,8 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     int64_t n = step_choose(run, wanted);
 
     SILT_RESERVE(run->x_old, run->x_old_capacity, 2 * run->nodes.count + 2);
-    memcpy(run->x_old, run->nodes.x, 2 * (size_t)run->nodes.count * sizeof(double));
+    if (run->nodes.count)
+        memcpy(run->x_old, run->nodes.x, 2 * (size_t)run->nodes.count * sizeof(double));
     silt_status solved = SILT_OK;
     if (scene->fluid.on)
         solved = water_step(run, &n, err);

@@ -5,6 +5,7 @@
 #define DEPOSIT_FORCE 0.1   // net force, of the submerged weight
 #define DEPOSIT_TIME 10     // times sqrt(d/g), at rest for so long
 #define RELEASE_MOST 64     // patches in one step
+#define RELEASE_HANGS -0.4  // upward part of the normal out of the bed below which sand does not hold
 
 static double gravity_of(const silt_scene *scene) { return hypot(scene->gravity[0], scene->gravity[1]); }
 
@@ -45,6 +46,23 @@ static void release_node(silt_run *run, int node) {
     }
 }
 
+// sand has no strength to hang over what was washed out below it: a row falls in a step
+static void release_hanging(silt_run *run) {
+    const double *g = run->scene->gravity, size = gravity_of(run->scene);
+    int hanging[RELEASE_MOST], n = 0;
+    for (int k = 0; k < run->bed.n_node && n < RELEASE_MOST && size > 0; k++) {
+        double normal[2];
+        if (!run->bed.alive[k] || !run->bed.exposed[k])
+            continue;
+        silt_bed_normal(&run->bed, k, normal);
+        if (-(normal[0] * g[0] + normal[1] * g[1]) < RELEASE_HANGS * size)
+            hanging[n++] = k;
+    }
+    for (int k = 0; k < n; k++)
+        if (run->bed.alive[hanging[k]] && run->bed.exposed[hanging[k]])
+            release_node(run, hanging[k]);
+}
+
 void silt_run_release(silt_run *run) {
     if (!run->scene->bed.on)
         return;
@@ -62,6 +80,8 @@ void silt_run_release(silt_run *run) {
             if (run->bed.alive[due[k]])
                 release_node(run, due[k]);
     }
+    if (isfinite(run->scene->bed.work))
+        release_hanging(run);
     if (run->coupling && run->bed.revision != run->bed_revision) {
         silt_coupling_dem.bed_changed(run->coupling, &run->bed);
         run->bed_revision = run->bed.revision;
@@ -109,15 +129,20 @@ void silt_run_place(silt_run *run) {
     free(placed);
 }
 
-// physics 7: slow, balanced, carried by the bed, and so for a while
+// physics 7: slow; a clock of rest is kept while it is so
+static bool grain_slow(const silt_run *run, const silt_grain_state *grains, int k) {
+    const silt_scene *scene = run->scene;
+    const double lighter = scene->fluid.on ? scene->bed.density / scene->fluid.density - 1 : 1;
+    return hypot(grains->v[3 * k], grains->v[3 * k + 1]) <
+           DEPOSIT_SPEED * sqrt(silt_max(lighter, 0.01) * gravity_of(scene) * 2 * grains->radius[k]);
+}
+
+// balanced and carried by the bed: the clock goes on; the jolts of a neighbour stop it for the step
 static bool grain_rests(const silt_run *run, const silt_grain_state *grains, int k) {
     const silt_scene *scene = run->scene;
-    const double g = gravity_of(scene), d = 2 * grains->radius[k];
-    const double lighter = scene->fluid.on ? scene->bed.density / scene->fluid.density - 1 : 1;
-    const double speed = hypot(grains->v[3 * k], grains->v[3 * k + 1]);
-    const double weight = grains->mass[k] * g * (scene->fluid.on ? 1 - scene->fluid.density / scene->bed.density : 1);
-    return speed < DEPOSIT_SPEED * sqrt(silt_max(lighter, 0.01) * g * d) && grains->net_force[k] < DEPOSIT_FORCE * weight &&
-           grains->contacts[k] >= 2 && grains->on_bed[k];
+    const double weight =
+        grains->mass[k] * gravity_of(scene) * (scene->fluid.on ? 1 - scene->fluid.density / scene->bed.density : 1);
+    return grains->net_force[k] < DEPOSIT_FORCE * weight && grains->contacts[k] >= 2 && grains->on_bed[k];
 }
 
 // node of the new bed cells needs its place in the water's cloud: water nodes that crowd it leave
@@ -141,10 +166,11 @@ silt_status silt_run_deposit(silt_run *run, silt_error *err) {
         while (old < run->n_rest && run->rest[old].id < grains->id[k])
             old++;
         const double had = old < run->n_rest && run->rest[old].id == grains->id[k] ? run->rest[old].time : 0;
-        if (!grain_rests(run, grains, k))
+        if (!grain_slow(run, grains, k))
             continue;
-        const double now = had + run->dt;
-        if (now > DEPOSIT_TIME * sqrt(2 * grains->radius[k] / silt_max(g, 1e-12))) {
+        const bool rests = grain_rests(run, grains, k);
+        const double now = had + (rests ? run->dt : 0);
+        if (rests && now > DEPOSIT_TIME * sqrt(2 * grains->radius[k] / silt_max(g, 1e-12))) {
             silt_deposit deposit = {0};
             const double x[2] = {grains->x[3 * k], grains->x[3 * k + 1]};
             if (silt_bed_deposit(&run->bed, scene, x, grains->radius[k], grains->mass[k], &deposit) != DEPOSIT_REFUSED) {

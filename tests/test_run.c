@@ -1,0 +1,223 @@
+// the run from inside: what a scene without bed does not have, and a step that fails leaves everything as it was
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+// the loop's own functions
+#include "../pfem/run.c"
+
+#include <dirent.h>
+#include <sys/stat.h>
+
+static char folder[512];
+
+// a scene of the tree, with what is set in it, at its start in a folder of its own
+static void begin(silt_run *run, silt_scene **scene, const char *path, int n_set, const char *const *set) {
+    silt_error err = {0};
+    silt_run_def def = {.quiet = true};
+    char full[1024];
+    snprintf(full, sizeof full, "%s/%s", SILT_SOURCE, path);
+    if (silt_scene_read(full, n_set, set, scene, &err) != SILT_OK)
+        fail_msg("%s", err.text);
+    snprintf(folder, sizeof folder, "%s/tests/run-XXXXXX", SILT_BINARY);
+    assert_non_null(mkdtemp(folder));
+    run_begin(run, *scene, &def, folder, -1);
+    if (run_start(run, &err) != SILT_OK)
+        fail_msg("%s", err.text);
+}
+
+static void end(silt_run *run, silt_scene **scene) {
+    run_free(run);
+    silt_scene_free(scene);
+    DIR *list = opendir(folder);
+    for (struct dirent *entry; list && (entry = readdir(list));)
+        if (entry->d_name[0] != '.')
+            unlinkat(dirfd(list), entry->d_name, 0);
+    closedir(list);
+    rmdir(folder);
+}
+
+static void steps(silt_run *run, int n) {
+    silt_error err = {0};
+    for (int k = 0; k < n; k++)
+        if (run_step(run, &err) != SILT_OK || step_close(run, &err) != SILT_OK || step_output(run, &err) != SILT_OK)
+            fail_msg("step %d: %s", k, err.text);
+}
+
+static bool zero(const void *data, size_t size) {
+    for (size_t k = 0; k < size; k++)
+        if (((const char *)data)[k])
+            return false;
+    return true;
+}
+
+// ---------------------------------------------------------------- water alone
+
+static void test_water_alone(void **state) {
+    (void)state;
+    silt_run run;
+    silt_scene *scene;
+    begin(&run, &scene, "cases/dam-break/scene.yaml", 1, (const char *const[]){"fluid.size=0.006"});
+    steps(&run, 20);
+
+    // no array of bed, grains or bodies was ever made
+    assert_true(zero(&run.bed, sizeof run.bed));
+    assert_null(run.coupling);
+    assert_null(run.drag);
+    assert_null(run.barrier.bed);
+    assert_null(run.barrier.bodies);
+    assert_null(run.waiting);
+    assert_null(run.rest);
+    assert_null(run.freed);
+    assert_null(run.grown);
+    assert_null(run.body_before);
+    silt_view view;
+    run_view(&run, &view);
+    assert_null(view.bed);
+    assert_null(view.grains);
+    assert_null(view.bodies);
+    assert_true(view.wall[PHASE_bed] == 0 && view.wall[PHASE_dem] == 0);
+
+    // nor a column or a file
+    char path[600], header[8192];
+    snprintf(path, sizeof path, "%s/history.csv", folder);
+    FILE *from = fopen(path, "r");
+    assert_non_null(from);
+    assert_non_null(fgets(header, sizeof header, from));
+    fclose(from);
+    header[strcspn(header, "\n")] = 0;
+    for (char *name = strtok(header, ","); name; name = strtok(NULL, ",")) {
+        const bool wall = strncmp(name, "wall_", 5) == 0; // the clock has a column per phase in every scene
+        if (!wall && (strstr(name, "bed") || strstr(name, "grain") || strstr(name, "sediment") || strstr(name, "released") ||
+                      strstr(name, "deposited") || strstr(name, "pore") || strstr(name, "left")))
+            fail_msg("a scene of water alone has the column %s", name);
+    }
+    DIR *list = opendir(folder);
+    assert_non_null(list);
+    for (struct dirent *entry; (entry = readdir(list));)
+        if (strncmp(entry->d_name, "bed", 3) == 0 || strncmp(entry->d_name, "grains", 6) == 0 ||
+            strncmp(entry->d_name, "bodies", 6) == 0 || strcmp(entry->d_name, "dem.log") == 0)
+            fail_msg("a scene of water alone has the file %s", entry->d_name);
+    closedir(list);
+    end(&run, &scene);
+}
+
+// ---------------------------------------------------------------- a step that fails
+
+/** bits of everything that a step changes */
+typedef struct bits {
+    uint64_t water, mesh, clocks, ledger, sediment, bed, grains, bodies;
+} bits;
+
+static bits take_bits(const silt_run *run) {
+    bits b = {0};
+    const silt_nodes *nodes = &run->nodes;
+    const size_t n = (size_t)nodes->count;
+    b.water = silt_hash(0, nodes->x, 2 * n * sizeof(double));
+    b.water = silt_hash(b.water, nodes->v, 2 * n * sizeof(double));
+    b.water = silt_hash(b.water, nodes->p, n * sizeof(double));
+    b.water = silt_hash(b.water, nodes->debt, n * sizeof(double));
+    b.water = silt_hash(b.water, nodes->id, n * sizeof *nodes->id);
+    b.water = silt_hash(b.water, nodes->kind, n);
+    b.water = silt_hash(b.water, nodes->wall, n * sizeof *nodes->wall);
+    b.mesh = silt_hash(0, run->mesh.cell, (size_t)run->mesh.n_cell * sizeof *run->mesh.cell);
+    b.mesh = silt_hash(b.mesh, &run->mesh.revision, sizeof run->mesh.revision);
+    const double clock[] = {run->time, run->offset, run->dt, (double)run->step, (double)run->frame, (double)run->tick};
+    b.clocks = silt_hash(0, clock, sizeof clock);
+    b.ledger = silt_hash(0, &run->ledger, sizeof run->ledger);
+    b.sediment = silt_hash(0, run->waiting, (size_t)run->n_waiting * sizeof *run->waiting);
+    b.sediment = silt_hash(b.sediment, run->rest, (size_t)run->n_rest * sizeof *run->rest);
+    const silt_bed *bed = &run->bed;
+    if (bed->n_node) {
+        b.bed = silt_hash(0, bed->work, (size_t)bed->n_node * sizeof(double));
+        b.bed = silt_hash(b.bed, bed->eroded, (size_t)bed->n_node * sizeof(double));
+        b.bed = silt_hash(b.bed, bed->cell, (size_t)bed->n_cell * sizeof *bed->cell);
+        b.bed = silt_hash(b.bed, bed->mass, (size_t)bed->n_cell * sizeof(double));
+    }
+    if (run->coupling) {
+        const silt_grain_state *grains = silt_coupling_dem.grains(run->coupling);
+        b.grains = silt_hash(0, grains->x, 3 * (size_t)grains->count * sizeof(double));
+        b.grains = silt_hash(b.grains, grains->v, 3 * (size_t)grains->count * sizeof(double));
+        b.grains = silt_hash(b.grains, grains->omega, 3 * (size_t)grains->count * sizeof(double));
+        const silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+        for (int k = 0; k < bodies->count; k++)
+            b.bodies = silt_hash(b.bodies, &bodies->body[k], offsetof(struct silt_body, n_point));
+    }
+    return b;
+}
+
+static void fails_and_leaves(const char *path, int n_set, const char *const *set, int before, int after) {
+    silt_run run;
+    silt_scene *scene;
+    silt_error err = {0};
+    begin(&run, &scene, path, n_set, set);
+    steps(&run, before);
+    const double dt = run.dt;
+    const bits whole = take_bits(&run);
+
+    // nothing can converge to this
+    const double tolerance = scene->fluid.tolerance;
+    const int iterations = scene->fluid.iterations;
+    scene->fluid.tolerance = 1e-30;
+    scene->fluid.iterations = 1;
+    for (int k = 0; k < 2; k++) {
+        err = (silt_error){0};
+        assert_int_equal(run_step(&run, &err), SILT_FAILED);
+        assert_true(run.whole);
+        assert_non_null(strstr(err.text, "gave up after"));
+        assert_non_null(strstr(err.text, "continuity did not converge: a node at ("));
+        const bits left = take_bits(&run);
+        assert_true(left.water == whole.water);
+        assert_true(left.mesh == whole.mesh);
+        assert_true(left.clocks == whole.clocks);
+        assert_true(left.ledger == whole.ledger);
+        assert_true(left.sediment == whole.sediment);
+        assert_true(left.bed == whole.bed);
+        assert_true(left.grains == whole.grains);
+        assert_true(left.bodies == whole.bodies);
+        assert_true(run.dt == dt);
+    }
+
+    // and the same run goes on as if nothing had been
+    scene->fluid.tolerance = tolerance;
+    scene->fluid.iterations = iterations;
+    steps(&run, after);
+    const bits mended = take_bits(&run);
+    end(&run, &scene);
+    begin(&run, &scene, path, n_set, set);
+    steps(&run, before + after);
+    const bits straight = take_bits(&run);
+    assert_true(memcmp(&mended, &straight, sizeof mended) == 0);
+    end(&run, &scene);
+}
+
+static void test_failed_step_water(void **state) {
+    (void)state;
+    fails_and_leaves("cases/dam-break/scene.yaml", 1, (const char *const[]){"fluid.size=0.006"}, 30, 10);
+}
+
+// water, bed, grains and a body, when grains are in the water
+static void test_failed_step_coupled(void **state) {
+    (void)state;
+    fails_and_leaves("tests/scenes/hill.yaml", 1, (const char *const[]){"bed.work=0.005"}, 58, 6);
+}
+
+// the body rides on moving water, whose inlet changes: prescribed velocities too are put back
+static void test_failed_step_prescribed(void **state) {
+    (void)state;
+    fails_and_leaves("tests/scenes/drum.yaml", 0, NULL, 12, 6);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_water_alone),
+        cmocka_unit_test(test_failed_step_water),
+        cmocka_unit_test(test_failed_step_coupled),
+        cmocka_unit_test(test_failed_step_prescribed),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
