@@ -9,25 +9,35 @@
 
 #include "run.h"
 
-// one run at a time in a folder; the lock ends with the process. *lock: descriptor, -1 where the file system has no locks
+// one run at a time in a folder; the lock ends with the process. *lock: descriptor, -1 where the file system has no
+// locks
 silt_status silt_folder_lock(const char *out, int *lock, silt_error *err) {
     *lock = open(out, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (*lock < 0)
-        return silt_fail(err, errno == ENOTDIR ? SILT_INPUT : SILT_FAILED, "%s: cannot be used as output folder: %s", out,
-                         strerror(errno));
+        return silt_fail(err, errno == ENOTDIR ? SILT_INPUT : SILT_FAILED, "%s: cannot be used as output folder: %s",
+                         out, strerror(errno));
     if (flock(*lock, LOCK_EX | LOCK_NB) == 0)
         return SILT_OK;
     const bool busy = errno == EWOULDBLOCK;
     close(*lock);
     *lock = -1;
-    return busy ? silt_fail(err, SILT_INPUT, "%s: another silt is running in this folder; name another one with -o, or stop it first", out)
+    return busy ? silt_fail(err, SILT_INPUT,
+                            "%s: another silt is running in this folder; name another one with -o, or stop it first",
+                            out)
                 : SILT_OK;
 }
 
 // what an earlier run left in the folder, and nothing else
 static void out_clear(const char *out) {
-    static const char *const ours[] = {"checkpoint-[ab].h5", "summary.json", "run.log", "history.csv", "dem.log", "run.h5",
-                                       "*.hdf.series", "*_[0-9][0-9][0-9][0-9][0-9][0-9].hdf", "picture_*.png"};
+    static const char *const ours[] = {"checkpoint-[ab].h5",
+                                       "summary.json",
+                                       "run.log",
+                                       "history.csv",
+                                       "dem.log",
+                                       "run.h5",
+                                       "*.hdf.series",
+                                       "*_[0-9][0-9][0-9][0-9][0-9][0-9].hdf",
+                                       "picture_*.png"};
     DIR *folder = opendir(out);
     for (struct dirent *entry; folder && (entry = readdir(folder));)
         for (size_t k = 0; k < sizeof ours / sizeof *ours; k++) {
@@ -46,8 +56,10 @@ silt_status silt_folder_prepare(const char *out, bool force, int *lock, silt_err
     if (!fresh && errno != EEXIST)
         return silt_fail(err, SILT_FAILED, "%s: cannot make the output folder: %s", out, strerror(errno));
     if (!fresh && !force)
-        return silt_fail(err, SILT_INPUT, "%s: exists already; name another folder with -o, replace it with --force, or go on with: silt resume %s",
-                         out, out);
+        return silt_fail(
+            err, SILT_INPUT,
+            "%s: exists already; name another folder with -o, replace it with --force, or go on with: silt resume %s",
+            out, out);
     SILT_TRY(silt_folder_lock(out, lock, err));
     if (!fresh)
         out_clear(out);
@@ -79,7 +91,11 @@ char *silt_worker_find(const char *asked) {
     *slash = 0;
     for (int k = 0; k < 3; k++) {
         char path[4200];
-        snprintf(path, sizeof path, k == 0 ? "%s/silt-dem" : k == 1 ? "%s/../silt-dem" : "%s/../libexec/silt/silt-dem", self);
+        snprintf(path, sizeof path,
+                 k == 0   ? "%s/silt-dem"
+                 : k == 1 ? "%s/../silt-dem"
+                          : "%s/../libexec/silt/silt-dem",
+                 self);
         if (access(path, X_OK) == 0)
             return silt_text("%s", path);
     }

@@ -346,7 +346,8 @@ static silt_status frame_links(const frame_list *list, const bool has[FRAME_PART
     if (!reason && !bad && rename(aside, path) != 0)
         reason = errno;
     if (reason || bad) {
-        status = silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path, reason ? strerror(reason) : "HDF5 refused");
+        status =
+            silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path, reason ? strerror(reason) : "HDF5 refused");
         unlink(aside);
     }
     free(aside);

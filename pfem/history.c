@@ -42,7 +42,6 @@ static const history_column history_ledger[] = {
     {"volume_solved", PART_FLUID, offsetof(silt_ledger, volume_solved), false},
     {"volume_moved", PART_FLUID, offsetof(silt_ledger, volume_moved), false},
     {"volume_reconnected", PART_FLUID, offsetof(silt_ledger, volume_reconnected), false},
-    {"volume_edited", PART_FLUID, offsetof(silt_ledger, volume_edited), false},
     {"bed_mass", PART_BED, offsetof(silt_ledger, bed_mass), false},
     {"released_mass", PART_BED, offsetof(silt_ledger, released_mass), false},
     {"deposited_mass", PART_BED, offsetof(silt_ledger, deposited_mass), false},

@@ -241,8 +241,8 @@ typedef struct silt_ledger {
     double grain_water[3], grain_contact[3];      // N/m, force of the water and of contacts on all grains, mean of the last step
     double external_work, dissipation;            // J/m, cumulative
     double max_speed;                             // m/s, of the water's nodes
-    // where volume went, cumulative, m3: solved (divergence left), moved (integration), reconnected (remeshing), edited (nodes added, removed)
-    double volume_solved, volume_moved, volume_reconnected, volume_edited;
+    // where volume went, cumulative, m3: solved (divergence left), moved (integration), reconnected (remeshing, nodes added and removed)
+    double volume_solved, volume_moved, volume_reconnected;
     // the larger of two, of the last step's solve: force on the water that its inertia does not answer, relative to weight and
     // inertia; force of the grains on the water plus force of the water on the grains, relative to what they exchange
     double momentum_error;

@@ -354,7 +354,10 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     memset(run->phase, 0, sizeof run->phase);
     const double before = run->dt;
     const double wanted = step_wanted(run);
-    SILT_TRY(step_sane(run, wanted, err));
+    if (step_sane(run, wanted, err) != SILT_OK) {
+        run->whole = false; // not worth a checkpoint
+        return SILT_FAILED;
+    }
     int64_t n = step_choose(run, wanted);
 
     SILT_RESERVE(run->x_old, run->x_old_capacity, 2 * run->nodes.count + 2);

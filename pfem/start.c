@@ -22,8 +22,11 @@ static bool run_solid(const void *context, const double x[2], double margin) {
 }
 
 void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def) {
-    *def = (silt_coupling_def){.scene = run->scene, .walls = &run->walls, .bed = run->scene->bed.on ? &run->bed : NULL,
-                               .worker = run->worker, .log = run->log};
+    *def = (silt_coupling_def){.scene = run->scene,
+                               .walls = &run->walls,
+                               .bed = run->scene->bed.on ? &run->bed : NULL,
+                               .worker = run->worker,
+                               .log = run->log};
     memcpy(def->lo, run->box_lo, sizeof def->lo);
     memcpy(def->hi, run->box_hi, sizeof def->hi);
 }

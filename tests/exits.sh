@@ -3,6 +3,7 @@
 # usage: exits.sh SILT SCENE WRONG    (WRONG: a scene with an error)
 test_name=exits
 [ $# -eq 3 ] || { sed -n '3s/^# //p' "$0" >&2; exit 2; }
+# shellcheck source=tests/system.sh
 . "$(dirname "$0")/system.sh"
 silt=$1
 scene=$2

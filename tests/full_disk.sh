@@ -18,6 +18,7 @@ if [ -z "${SILT_OWN_MOUNTS:-}" ]; then
     echo "full_disk: skipped, no file system can be mounted here"
     exit 77
 fi
+# shellcheck source=tests/system.sh
 . "$(dirname "$0")/system.sh"
 silt=$1
 scene=$2

@@ -5,6 +5,7 @@
 # usage: regression.sh SILT SCENE STORED.csv
 test_name=regression
 [ $# -eq 3 ] || { sed -n '5s/^# //p' "$0" >&2; exit 2; }
+# shellcheck source=tests/system.sh
 . "$(dirname "$0")/system.sh"
 
 horizon=$(sed -n 's/^# horizon: \([0-9.]*\) s.*/\1/p' "$3")

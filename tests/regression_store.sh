@@ -7,6 +7,7 @@
 # regression.sh with that silt: the largest difference must stay far below the tolerance.
 test_name=regression_store
 [ $# -ge 3 ] || { sed -n '4,5s/^# //p' "$0" >&2; exit 2; }
+# shellcheck source=tests/system.sh
 . "$(dirname "$0")/system.sh"
 horizon=${4:-0.22}
 

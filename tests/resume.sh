@@ -6,6 +6,7 @@
 # e.g.:  resume.sh build/silt cases/dam-break/scene.yaml 150 0.2 -D fluid.size=0.004 -D time.end=0.3
 test_name=resume
 [ $# -ge 4 ] || { sed -n '3,6s/^# //p' "$0" >&2; exit 2; }
+# shellcheck source=tests/system.sh
 . "$(dirname "$0")/system.sh"
 silt=$1
 scene=$2
@@ -28,8 +29,8 @@ launch "$silt" run "$scene" -q -o "$cut" --threads 1 "$@"
 until_saved "$cut" "$wanted"
 kill_hard
 at=$(rows "$cut")
-cp -r "$cut" "$work/twice"
-cp -r "$cut" "$work/damaged"
+cp -rp "$cut" "$work/twice"
+cp -rp "$cut" "$work/damaged"
 expect 0 "$silt" resume "$cut" -q --threads 2
 same "$whole" "$cut"
 no_parts "$cut"
@@ -69,7 +70,7 @@ if [ ! -e "$oldest" ]; then
 fi
 cp "$work/half" "$newest"
 expect 0 "$silt" resume "$cut" -q
-grep -q "passed over: .*${newest##*/}" "$cut/run.log" || fail "run.log does not say that ${newest##*/} was passed over"
+grep -q "from ${oldest##*/}; passed over: .*${newest##*/}" "$cut/run.log" || fail "run.log does not say that ${newest##*/} was passed over"
 same "$whole" "$cut"
 say "newest checkpoint cut short: the older one gave the same bits"
 

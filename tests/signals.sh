@@ -3,6 +3,7 @@
 # usage: signals.sh SILT SCENE ROWS [option of silt run]...
 test_name=signals
 [ $# -ge 3 ] || { sed -n '3s/^# //p' "$0" >&2; exit 2; }
+# shellcheck source=tests/system.sh
 . "$(dirname "$0")/system.sh"
 silt=$1
 scene=$2
@@ -18,7 +19,6 @@ cut=$work/cut
 launch "$silt" run "$scene" -q -o "$cut" -D time.checkpoint=1e9 "$@"
 until_rows "$cut" $((wanted / 2))
 kill -USR1 "$pid"
-waited=0
 while [ ! -e "$cut/checkpoint-a.h5" ]; do
     alive "$pid" || fail "the run ended without a checkpoint after SIGUSR1"
     sleep 0.02

@@ -5,6 +5,7 @@
 #   ITERATIONS  of a step, so few that a step somewhere needs another try
 test_name=stuck
 [ $# -ge 3 ] || { sed -n '4,5s/^# //p' "$0" >&2; exit 2; }
+# shellcheck source=tests/system.sh
 . "$(dirname "$0")/system.sh"
 silt=$1
 scene=$2

@@ -92,8 +92,9 @@ static void test_water_alone(void **state) {
     header[strcspn(header, "\n")] = 0;
     for (char *name = strtok(header, ","); name; name = strtok(NULL, ",")) {
         const bool wall = strncmp(name, "wall_", 5) == 0; // the clock has a column per phase in every scene
-        if (!wall && (strstr(name, "bed") || strstr(name, "grain") || strstr(name, "sediment") || strstr(name, "released") ||
-                      strstr(name, "deposited") || strstr(name, "pore") || strstr(name, "left")))
+        if (!wall &&
+            (strstr(name, "bed") || strstr(name, "grain") || strstr(name, "sediment") || strstr(name, "released") ||
+             strstr(name, "deposited") || strstr(name, "pore") || strstr(name, "left")))
             fail_msg("a scene of water alone has the column %s", name);
     }
     DIR *list = opendir(folder);

@@ -4,6 +4,7 @@
 # usage: worker.sh SILT SCENE ROWS [option of silt run]...
 test_name=worker
 [ $# -ge 3 ] || { sed -n '4s/^# //p' "$0" >&2; exit 2; }
+# shellcheck source=tests/system.sh
 . "$(dirname "$0")/system.sh"
 silt=$1
 scene=$2
