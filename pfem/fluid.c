@@ -117,6 +117,40 @@ static void hold_nodes(silt_fluid *f, const silt_scene *scene, const silt_walls 
         }
 }
 
+static int piece_root(int *parent, int i) {
+    while (parent[i] != i)
+        i = parent[i] = parent[parent[i]];
+    return i;
+}
+
+// films and crumbs of water on bed, walls or bodies, with a node or two that are free: too few to keep a volume; they run
+// as drops do, at no pressure, and what they gain is owed
+static void find_crumbs(silt_fluid *f, const silt_mesh *mesh, double *p) {
+    int *parent = silt_alloc((size_t)f->n_node + 1, sizeof *parent), *n_free = silt_alloc((size_t)f->n_node + 1, sizeof *n_free);
+    uint8_t *held = silt_alloc((size_t)f->n_node + 1, 1);
+    for (int i = 0; i < f->n_node; i++)
+        parent[i] = i;
+    for (int e = 0; e < f->n_cell; e++)
+        for (int a = 1; a < 3; a++) {
+            const int q = piece_root(parent, mesh->cell[e][0]), r = piece_root(parent, mesh->cell[e][a]);
+            parent[q > r ? q : r] = q > r ? r : q;
+        }
+    for (int i = 0; i < f->n_node; i++) {
+        n_free[piece_root(parent, i)] += f->hold[i] == 0;
+        held[piece_root(parent, i)] |= f->hold[i] > 0;
+    }
+    for (int i = 0; i < f->n_node; i++) {
+        const int r = piece_root(parent, i);
+        if (!mesh->wet[i] || n_free[r] > 2 || !held[r] || f->mobile[i] != 1)
+            continue;
+        f->mobile[i] = 2;
+        f->rate[i] = p[i] = 0;
+    }
+    free(parent);
+    free(n_free);
+    free(held);
+}
+
 // a node whose whole surroundings are held has no say in its volume
 static void find_mobile(silt_fluid *f, const silt_mesh *mesh) {
     for (int i = 0; i < f->n_node; i++) {
@@ -524,8 +558,10 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_scene *scene, const s
         if (drag && drag->update)
             drag->update(drag->self, f->w, p, dt);
         midpoint(f, scene, nodes, mesh, drag, dt);
-        if (f->iterations == 0)
+        if (f->iterations == 0) {
             find_mobile(f, mesh);
+            find_crumbs(f, mesh, p);
+        }
         if (f->iterations == 0 || !consistent)
             project_gradient(f, mesh, p);
         momentum_right(f, scene, nodes, mesh, drag, dt, p, f->force);
