@@ -120,7 +120,10 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def, sil
     }
     if (rayleigh == HUGE_VAL)
         rayleigh = coupling_rayleigh(contact, smallest, 1000.0);
+    // a whole number of steps makes a frame, so that the clocks of water and grains are one
     c->step = contact->step * rayleigh;
+    if (scene->time.output > 0)
+        c->step = scene->time.output / ceil(scene->time.output / c->step);
 
     c->exchange.law = grains->drag;
     c->exchange.density = scene->fluid.density;

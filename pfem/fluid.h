@@ -29,6 +29,7 @@ typedef struct silt_fluid {
     double *normal;       // owned, 2 per node, where hold is 1
     double *cg[3];        // owned, 2 per node, momentum solver
     double (*tau);        // owned, per cell, stabilisation
+    bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned
 
     // of the last step

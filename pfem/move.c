@@ -270,7 +270,9 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     SILT_RESERVE(run->map, run->map_capacity, nodes->count + 1);
     SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
     run->ledger.volume_reconnected += run->memory.reconnected;
-    run->ledger.outflow_mass += rho * run->memory.left;
+    // without an outlet nothing may leave: what does anyway shows as a volume error
+    if (scene->fluid.n_outlet)
+        run->ledger.outflow_mass += rho * run->memory.left;
     for (int k = 0; k < run->bed.n_node; k++)
         if (run->bed.fluid_node[k] >= 0)
             run->bed.fluid_node[k] = run->map[run->bed.fluid_node[k]];

@@ -110,7 +110,6 @@ typedef struct silt_memory {
     int n_node, flag_capacity, dead_capacity;
     uint8_t *interior; // owned, one per node: had cells and no free edge
     uint8_t *dead;     // owned, one per node: leaves the cloud at the rebuild; NODE_LEFT: takes its water out of the domain
-    int n_added, n_removed; // by refinement, of the last step
     double reconnected;     // m3, volume that the rebuild itself made (positive) or lost
     double left;            // m3, volume that went with the nodes that left
 } silt_memory;
@@ -122,7 +121,7 @@ void silt_memory_extend(silt_memory *memory, int n_node);
 /** Marks crowded nodes dead and adds nodes where the mesh is stretched (refine.c). */
 void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h);
 
-/** what the water cannot enter; distance < 0 inside */
+/** what the water cannot enter */
 typedef struct silt_barrier {
     const silt_walls *walls;
     const silt_bed *bed;             // NULL: none
@@ -174,7 +173,7 @@ struct silt_bed {
     uint8_t *alive;      // owned, 1 while a bed cell holds the node
     uint8_t *exposed;    // owned, 1 when the node lies on the bed's surface (an edge of one bed cell only, not on a tank wall)
     double *work;        // owned, J/m3, frictional work since exposure (accumulator)
-    double *eroded;      // owned, kg/m2, mass per area worn off since exposure (accumulator, physics 6)
+    double *eroded;      // owned, kg/m2, mass per area worn off since exposure (accumulator)
     double *shear;       // owned, Pa, bed shear stress of the last step
     int *fluid_node;     // owned, index of the NODE_BED in silt_nodes, -1 while not exposed
     int n_cell, cell_capacity;
@@ -233,7 +232,7 @@ typedef struct silt_ledger {
     double initial_volume;    // water at the start
     double inflow_mass, outflow_mass;             // water, cumulative, kg
     double pore_water_mass;                       // released less taken up, cumulative, kg
-    double bed_mass, released_mass, deposited_mass, left_mass, fed_mass;      // sediment, cumulative, kg
+    double bed_mass, released_mass, deposited_mass, left_mass;      // sediment, cumulative, kg
     double initial_sediment;
     int grain_count;
     double grain_mass, sediment_error;

@@ -32,7 +32,6 @@ void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nod
     SILT_RESERVE(memory->area, memory->area_capacity, mesh->n_cell + 1);
     memory->n_cell = mesh->n_cell;
     memory->n_taken = 0;
-    memory->n_added = memory->n_removed = 0;
     for (int e = 0; e < mesh->n_cell; e++) {
         memcpy(memory->cell[e], mesh->cell[e], sizeof memory->cell[e]);
         memory->area[e] = silt_cell_area(nodes->x, mesh->cell[e]);
@@ -65,7 +64,6 @@ static int refine_rank(const refinement *r, int i) {
 
 static void refine_remove(refinement *r, int i) {
     r->memory->dead[i] = 1;
-    r->memory->n_removed++;
     refine_lock(r, i);
 }
 
@@ -157,7 +155,6 @@ static void refine_stretched(refinement *r) {
         for (int k = 0; k < r->mesh->n_edge && !boundary; k++)
             boundary = r->mesh->edge[k][0] == a && r->mesh->edge[k][1] == b;
         r->memory->interior[i] = !boundary;
-        r->memory->n_added++;
         for (int c = 0; c < 3; c++)
             r->locked[cell[c]] = 1;
         for (int k = r->mesh->node_cell_start[a]; k < r->mesh->node_cell_start[a + 1]; k++) {

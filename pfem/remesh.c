@@ -315,7 +315,7 @@ static void book_volume(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *m
             sum[g] += nodes->debt[i];
             nodes->debt[i] = 0;
             touched[i] = 1;
-        } else if (!wet[i] && was_wet[i]) {
+        } else if (!wet[i] && was_wet[i] && nodes->kind[i] == NODE_FLUID) {
             nodes->debt[i] += share[i];
             sum[g] -= share[i];
             touched[i] = 1;

@@ -5,9 +5,13 @@
 
 #include "run.h"
 
-static volatile sig_atomic_t run_signal; // the last signal that asked for a checkpoint
+static volatile sig_atomic_t run_asked, run_stop; // a signal asked for a checkpoint; SIGTERM came
 
-static void on_signal(int number) { run_signal = number; }
+static void on_signal(int number) {
+    run_asked = 1;
+    if (number == SIGTERM)
+        run_stop = 1;
+}
 
 static void phase_add(silt_run *run, silt_phase phase, double since) { run->phase[phase] += silt_seconds() - since; }
 
@@ -82,6 +86,9 @@ static void ledger_take(silt_run *run) {
     for (int i = 0; i < nodes->count; i++)
         if (run->mesh.wet[i] || nodes->kind[i] == NODE_FLUID)
             ledger->max_speed = silt_max(ledger->max_speed, hypot(nodes->v[2 * i], nodes->v[2 * i + 1]));
+    // parcels that wait are solid in the place where they were released
+    for (int k = 0; k < run->n_waiting && scene->fluid.on; k++)
+        ledger->fluid_volume -= run->waiting[k].mass / scene->bed.density;
     ledger->fluid_volume += ledger->flying_volume;
     ledger->fluid_mass = rho * ledger->fluid_volume;
     ledger->bed_mass = run->bed.solid_mass;
@@ -264,6 +271,7 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
             water_restore(run);
             return status;
         }
+        run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
         status = silt_fluid_step(&run->fluid, scene, &run->walls, &run->nodes, &run->mesh, run->drag, run->dt, err);
         run->phase[PHASE_assemble] += run->fluid.seconds_assemble;
         run->phase[PHASE_solve] += run->fluid.seconds_solve;
@@ -537,11 +545,10 @@ static silt_status run_loop(silt_run *run, silt_error *err) {
         if (status != SILT_OK)
             break;
         const bool frame = run->tick == 0 && run->offset == 0;
-        if (run_signal) {
-            const int number = run_signal;
-            run_signal = 0;
+        if (run_asked) {
+            run_asked = 0;
             status = checkpoint_write(run, err);
-            if (status == SILT_OK && number == SIGTERM)
+            if (status == SILT_OK && run_stop)
                 status = silt_fail(err, SILT_STOPPED, "stopped by a signal at t = %.9g s; a checkpoint is written, go on with: silt resume %s",
                                    run->time, run->out);
         } else if (frame && run->frame % frames_between == 0)
@@ -585,7 +592,7 @@ static void signals_catch(void) {
     sigemptyset(&action.sa_mask);
     sigaction(SIGTERM, &action, NULL);
     sigaction(SIGUSR1, &action, NULL);
-    run_signal = 0;
+    run_asked = run_stop = 0;
 }
 
 // the state at t = 0 with its row and frame

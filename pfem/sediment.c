@@ -5,7 +5,9 @@
 #define DEPOSIT_FORCE 0.1   // net force, of the submerged weight
 #define DEPOSIT_TIME 10     // times sqrt(d/g), at rest for so long
 #define RELEASE_MOST 64     // patches in one step
-#define RELEASE_HANGS -0.4  // upward part of the normal out of the bed below which sand does not hold
+#define RELEASE_LONG 4      // radii: a parcel that had to look farther goes up through the heap on it
+#define RELEASE_FAR 12      // radii, the farthest that it looks
+#define RELEASE_HANGS -0.3  // upward part of the normal out of the bed below which sand does not hold
 
 static double gravity_of(const silt_scene *scene) { return hypot(scene->gravity[0], scene->gravity[1]); }
 
@@ -23,6 +25,12 @@ static void remember_cell(silt_run *run, const int cell[3], double area, bool fr
     }
 }
 
+// of a bed cell's area, what water and grains fill once it is bed no more: the solid, and the pores as far as they are wet
+static double cell_water(const silt_run *run, int cell) {
+    const double solid = run->bed.mass[cell] / run->scene->bed.density;
+    return solid + run->scene->bed.saturation * (run->bed.area[cell] - solid);
+}
+
 static void release_node(silt_run *run, int node) {
     const silt_scene *scene = run->scene;
     silt_patch patch;
@@ -30,7 +38,7 @@ static void release_node(silt_run *run, int node) {
     if (patch.n_cell == 0)
         return;
     for (int k = 0; k < patch.n_cell; k++)
-        remember_cell(run, run->bed.cell[patch.cell[k]], run->bed.area[patch.cell[k]], true);
+        remember_cell(run, run->bed.cell[patch.cell[k]], cell_water(run, patch.cell[k]), true);
     silt_bed_release(&run->bed, scene, &patch);
     run->ledger.released_mass += patch.mass;
 
@@ -46,20 +54,27 @@ static void release_node(silt_run *run, int node) {
     }
 }
 
-// sand has no strength to hang over what was washed out below it: a row falls in a step
+// Sand has no strength to hang over what was washed out below it: nodes in a roof fall, a row in a step. Those between an
+// edge that faces down and one that does not are a rough wall, and stay.
 static void release_hanging(silt_run *run) {
+    const silt_bed *bed = &run->bed;
     const double *g = run->scene->gravity, size = gravity_of(run->scene);
-    int hanging[RELEASE_MOST], n = 0;
-    for (int k = 0; k < run->bed.n_node && n < RELEASE_MOST && size > 0; k++) {
-        double normal[2];
-        if (!run->bed.alive[k] || !run->bed.exposed[k])
-            continue;
-        silt_bed_normal(&run->bed, k, normal);
-        if (-(normal[0] * g[0] + normal[1] * g[1]) < RELEASE_HANGS * size)
-            hanging[n++] = k;
+    if (!(size > 0) || bed->n_node == 0)
+        return;
+    int *count = silt_alloc((size_t)bed->n_node, sizeof *count), hanging[RELEASE_MOST], n = 0;
+    for (int e = 0; e < bed->n_edge; e++) {
+        const double *p = bed->x[bed->edge[e][0]], *q = bed->x[bed->edge[e][1]];
+        // the water is on the left
+        const double up = ((q[1] - p[1]) * g[0] - (q[0] - p[0]) * g[1]) / (hypot(q[0] - p[0], q[1] - p[1]) * size);
+        for (int c = 0; c < 2; c++)
+            count[bed->edge[e][c]] += up < RELEASE_HANGS ? 1 : -1000;
     }
+    for (int k = 0; k < bed->n_node && n < RELEASE_MOST; k++)
+        if (count[k] >= 2)
+            hanging[n++] = k;
+    free(count);
     for (int k = 0; k < n; k++)
-        if (run->bed.alive[hanging[k]] && run->bed.exposed[hanging[k]])
+        if (bed->alive[hanging[k]] && bed->exposed[hanging[k]])
             release_node(run, hanging[k]);
 }
 
@@ -88,14 +103,19 @@ void silt_run_release(silt_run *run) {
     }
 }
 
-// a place for the parcel: out along the normal, then to the sides
+// a place for the parcel: out along the normal and to the sides; one that has waited long also straight up
 static bool find_room(const silt_run *run, const silt_waiting *waiting, double radius, int n_placed,
                       const silt_release *placed, double out[2]) {
-    const double *n = waiting->normal, tangent[2] = {-n[1], n[0]};
-    for (int out_step = 0; out_step <= 12; out_step++)
+    const double *g = run->scene->gravity, size = gravity_of(run->scene);
+    const double up[2] = {size > 0 ? -g[0] / size : 0, size > 0 ? -g[1] / size : 0};
+    const int steps = (int)silt_max(12, ceil(3 * (waiting->reach + radius) / radius));
+    const bool long_since = waiting->reach > RELEASE_LONG * radius && size > 0;
+    for (int way = 0; way <= steps * (1 + long_since); way++) {
+        const int out_step = way <= steps ? way : way - steps;
+        const double *n = way <= steps ? waiting->normal : up, tangent[2] = {-n[1], n[0]};
         for (int side = 0; side < 5; side++) {
             const double along = (side + 1) / 2 * (side % 2 ? 1 : -1) * 0.5 * radius;
-            const double outward = out_step * (waiting->reach + radius) / 12;
+            const double outward = out_step * (waiting->reach + radius) / steps;
             for (int d = 0; d < 2; d++)
                 out[d] = waiting->x[d] + outward * n[d] + along * tangent[d];
             int segment;
@@ -107,6 +127,7 @@ static bool find_room(const silt_run *run, const silt_waiting *waiting, double r
             if (free)
                 return true;
         }
+    }
     return false;
 }
 
@@ -120,8 +141,12 @@ void silt_run_place(silt_run *run) {
         if (find_room(run, waiting, release.radius, n_placed, placed, release.x)) {
             SILT_RESERVE(placed, capacity, n_placed + 1);
             placed[n_placed++] = release;
-        } else
-            run->waiting[kept++] = *waiting;
+        } else {
+            // it looks farther in the next step
+            run->waiting[kept] = *waiting;
+            run->waiting[kept].reach = silt_max(waiting->reach, silt_min(1.02 * waiting->reach, RELEASE_FAR * release.radius));
+            kept++;
+        }
     }
     run->n_waiting = kept;
     if (n_placed)
@@ -129,7 +154,7 @@ void silt_run_place(silt_run *run) {
     free(placed);
 }
 
-// physics 7: slow; a clock of rest is kept while it is so
+// slow: a clock of rest is kept while it is so
 static bool grain_slow(const silt_run *run, const silt_grain_state *grains, int k) {
     const silt_scene *scene = run->scene;
     const double lighter = scene->fluid.on ? scene->bed.density / scene->fluid.density - 1 : 1;
@@ -145,10 +170,10 @@ static bool grain_rests(const silt_run *run, const silt_grain_state *grains, int
     return grains->net_force[k] < DEPOSIT_FORCE * weight && grains->contacts[k] >= 2 && grains->on_bed[k];
 }
 
-// node of the new bed cells needs its place in the water's cloud: water nodes that crowd it leave
-static void clear_water(silt_run *run, const silt_deposit *deposit) {
+// new bed cells take their place from the water at the next rebuild
+static void remember_grown(silt_run *run, const silt_deposit *deposit) {
     for (int e = 0; e < deposit->n_cell; e++)
-        remember_cell(run, run->bed.cell[deposit->cell[e]], run->bed.area[deposit->cell[e]], false);
+        remember_cell(run, run->bed.cell[deposit->cell[e]], cell_water(run, deposit->cell[e]), false);
 }
 
 silt_status silt_run_deposit(silt_run *run, silt_error *err) {
@@ -176,7 +201,7 @@ silt_status silt_run_deposit(silt_run *run, silt_error *err) {
             if (silt_bed_deposit(&run->bed, scene, x, grains->radius[k], grains->mass[k], &deposit) != DEPOSIT_REFUSED) {
                 silt_coupling_dem.deposit(run->coupling, k);
                 run->ledger.deposited_mass += grains->mass[k];
-                clear_water(run, &deposit);
+                remember_grown(run, &deposit);
                 changed = true;
                 continue;
             }
@@ -219,7 +244,11 @@ void silt_run_bed_sync(silt_run *run) {
                 const double length = hypot(to[0] - from[0], to[1] - from[1]), tiny = 1e-6 * run->scene->fluid.size;
                 const double off = (x[0] - from[0]) * n[0] + (x[1] - from[1]) * n[1];
                 const double along = ((x[0] - from[0]) * (to[0] - from[0]) + (x[1] - from[1]) * (to[1] - from[1])) / length;
-                if (fabs(off) < tiny && along > -tiny && along < length + tiny)
+                if (fabs(off) >= tiny || along <= -tiny || along >= length + tiny)
+                    continue;
+                // nearly straight joints are no corners
+                const double *first = run->walls.normal[nodes->wall[i][0] < 0 ? s : nodes->wall[i][0]];
+                if (found == 0 || fabs(first[0] * n[1] - first[1] * n[0]) > 0.3)
                     nodes->wall[i][found++] = s;
             }
         }

@@ -8,7 +8,7 @@ typedef struct seed {
     silt_solid_test solid;
     const void *context;
     double h;
-    int *grid, nx, ny; // one cell of 0.5 h holds the last node put there, for spacing tests
+    int *grid, nx, ny; // cells of h, each with the last node put there, for spacing tests
     int *link;         // next node in the same grid cell
     int link_capacity;
     double lo[2];

@@ -1,6 +1,7 @@
 /** @file silt.h
  * The product's C API: read a scene, run it, resume it, hold the result against its checks.
- * Nothing here prints, exits or aborts: a function that can fail returns a silt_status and fills a silt_error.
+ * A function that can fail returns a silt_status and fills a silt_error; nothing here exits. A run prints a progress line on
+ * stderr unless it is quiet, and takes SIGTERM and SIGUSR1 while it lasts. Exhausted memory alone ends the program.
  */
 #ifndef SILT_SILT_H
 #define SILT_SILT_H
