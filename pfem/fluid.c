@@ -117,12 +117,6 @@ static void hold_nodes(silt_fluid *f, const silt_scene *scene, const silt_walls 
         }
 }
 
-static int piece_root(int *parent, int i) {
-    while (parent[i] != i)
-        i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 // films and crumbs of water on bed, walls or bodies, with a node or two that are free: too few to keep a volume; they run
 // as drops do, at no pressure, and what they gain is owed
 static void find_crumbs(silt_fluid *f, const silt_mesh *mesh, double *p) {
@@ -131,16 +125,13 @@ static void find_crumbs(silt_fluid *f, const silt_mesh *mesh, double *p) {
     for (int i = 0; i < f->n_node; i++)
         parent[i] = i;
     for (int e = 0; e < f->n_cell; e++)
-        for (int a = 1; a < 3; a++) {
-            const int q = piece_root(parent, mesh->cell[e][0]), r = piece_root(parent, mesh->cell[e][a]);
-            parent[q > r ? q : r] = q > r ? r : q;
-        }
+        silt_group_join(parent, mesh->cell[e]);
     for (int i = 0; i < f->n_node; i++) {
-        n_free[piece_root(parent, i)] += f->hold[i] < 2;
-        held[piece_root(parent, i)] |= f->hold[i] > 0;
+        n_free[silt_group_find(parent, i)] += f->hold[i] < 2;
+        held[silt_group_find(parent, i)] |= f->hold[i] > 0;
     }
     for (int i = 0; i < f->n_node; i++) {
-        const int r = piece_root(parent, i);
+        const int r = silt_group_find(parent, i);
         if (!mesh->wet[i] || n_free[r] > 2 || !held[r] || f->mobile[i] != 1)
             continue;
         f->mobile[i] = 2;
@@ -612,7 +603,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_scene *scene, const s
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", nodes->x[2 * worst_node],
                              nodes->x[2 * worst_node + 1]);
         const bool fine = f->worst <= def->tolerance;
-        // at the end of the iterations a small and shrinking residual is accepted; it stands in the ledger
+        // at the end of the iterations a small residual is accepted
         if (fine || (f->iterations >= def->iterations && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, 2 * (size_t)f->n_node * sizeof(double));
             return SILT_OK;

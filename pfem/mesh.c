@@ -6,6 +6,19 @@ double silt_cell_area(const double *x, const int cell[3]) {
     return 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
 }
 
+int silt_group_find(int *parent, int i) {
+    while (parent[i] != i)
+        i = parent[i] = parent[parent[i]];
+    return i;
+}
+
+void silt_group_join(int *parent, const int cell[3]) {
+    for (int a = 1; a < 3; a++) {
+        const int p = silt_group_find(parent, cell[0]), q = silt_group_find(parent, cell[a]);
+        parent[p > q ? p : q] = p > q ? q : p;
+    }
+}
+
 double silt_mesh_volume(const silt_mesh *mesh, const double *x) {
     double sum = 0;
     for (int e = 0; e < mesh->n_cell; e++)

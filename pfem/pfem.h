@@ -94,6 +94,9 @@ typedef struct silt_mesh {
 void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes);
 void silt_mesh_clear(silt_mesh *mesh);
 double silt_cell_area(const double *x, const int cell[3]);
+/** Groups of nodes (parent[i] = i at the start): the group's lowest node; and one group of a cell's three */
+int silt_group_find(int *parent, int i);
+void silt_group_join(int *parent, const int cell[3]);
 /** m3, sum of the cells */
 double silt_mesh_volume(const silt_mesh *mesh, const double *x);
 

@@ -77,12 +77,6 @@ static int neighbour_index(const silt_mesh *mesh, int i, int j) {
     return lo;
 }
 
-static int root(int *parent, int i) {
-    while (parent[i] != i)
-        i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 // pieces of water without a free surface know their pressure up to a constant: one node each is pinned
 static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     SILT_RESERVE(p->pinned, p->pinned_capacity, mesh->n_node + 1);
@@ -92,16 +86,13 @@ static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
         p->pinned[i] = 0;
     }
     for (int e = 0; e < mesh->n_cell; e++)
-        for (int a = 1; a < 3; a++) {
-            const int r = root(parent, mesh->cell[e][0]), s = root(parent, mesh->cell[e][a]);
-            parent[r > s ? r : s] = r > s ? s : r;
-        }
+        silt_group_join(parent, mesh->cell[e]);
     for (int i = 0; i < mesh->n_node; i++)
         if (mesh->wet[i])
-            p->pinned[root(parent, i)] = 1;
+            p->pinned[silt_group_find(parent, i)] = 1;
     for (int i = 0; i < mesh->n_node; i++)
         if (mesh->surface[i])
-            p->pinned[root(parent, i)] = 0;
+            p->pinned[silt_group_find(parent, i)] = 0;
     free(parent);
 }
 

@@ -92,22 +92,6 @@ static int set_find(const cell_set *set, const int cell[3]) {
     return -1;
 }
 
-// ---- groups of nodes whose cells changed together
-
-static int group_find(int *parent, int i) {
-    while (parent[i] != i)
-        i = parent[i] = parent[parent[i]];
-    return i;
-}
-
-static void group_join(int *parent, const int cell[3]) {
-    for (int a = 1; a < 3; a++) {
-        const int p = group_find(parent, cell[0]), q = group_find(parent, cell[a]);
-        if (p != q)
-            parent[p > q ? p : q] = p > q ? q : p;
-    }
-}
-
 // three nodes on one straight wall make no cell
 static bool cell_on_wall(const silt_nodes *nodes, const int cell[3]) {
     for (int s = 0; s < 2; s++) {
@@ -268,17 +252,17 @@ static void book_volume(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *m
     double made = 0;
     for (int e = 0; e < memory->n_cell; e++)
         if (!kept[e])
-            group_join(parent, memory->cell[e]);
+            silt_group_join(parent, memory->cell[e]);
     for (int e = 0; e < mesh->n_cell; e++)
         if (set_find(&old, mesh->cell[e]) < 0)
-            group_join(parent, mesh->cell[e]);
+            silt_group_join(parent, mesh->cell[e]);
     for (int e = 0; e < memory->n_taken; e++)
-        group_join(parent, memory->taken[e]);
+        silt_group_join(parent, memory->taken[e]);
 
     // what every group lost less what it got
     for (int e = 0; e < memory->n_cell; e++)
         if (!kept[e]) {
-            sum[group_find(parent, memory->cell[e][0])] += memory->area[e];
+            sum[silt_group_find(parent, memory->cell[e][0])] += memory->area[e];
             made -= memory->area[e];
             for (int a = 0; a < 3; a++) {
                 share[memory->cell[e][a]] += memory->area[e] / 3;
@@ -286,7 +270,7 @@ static void book_volume(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *m
             }
         }
     for (int e = 0; e < memory->n_taken; e++) {
-        sum[group_find(parent, memory->taken[e][0])] -= memory->taken_area[e];
+        sum[silt_group_find(parent, memory->taken[e][0])] -= memory->taken_area[e];
         made += memory->taken_area[e];
         touched[memory->taken[e][0]] = 1;
     }
@@ -296,7 +280,7 @@ static void book_volume(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *m
         for (int a = 0; a < 3; a++)
             wet[mesh->cell[e][a]] = 1;
         if (before < 0) {
-            sum[group_find(parent, mesh->cell[e][0])] -= area;
+            sum[silt_group_find(parent, mesh->cell[e][0])] -= area;
             made += area;
             for (int a = 0; a < 3; a++)
                 touched[mesh->cell[e][a]] = 1;
@@ -310,7 +294,7 @@ static void book_volume(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *m
 
     // debts of nodes that left or came back go into their group; a node that flies off takes its share
     for (int i = 0; i < n; i++) {
-        const int g = group_find(parent, i);
+        const int g = silt_group_find(parent, i);
         if (memory->dead[i] || (wet[i] && !was_wet[i])) {
             sum[g] += nodes->debt[i];
             nodes->debt[i] = 0;
@@ -325,22 +309,22 @@ static void book_volume(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *m
     memory->left = 0;
     for (int i = 0; i < n; i++)
         if (memory->dead[i] == NODE_LEFT) {
-            const int g = group_find(parent, i);
+            const int g = silt_group_find(parent, i);
             memory->left += sum[g];
             sum[g] = 0;
         }
     memory->reconnected = made + memory->left;
     for (int i = 0; i < n; i++)
         if (touched[i] && wet[i] && !memory->dead[i])
-            members[group_find(parent, i)]++;
+            members[silt_group_find(parent, i)]++;
     for (int i = 0; i < n; i++) {
-        const int g = group_find(parent, i);
+        const int g = silt_group_find(parent, i);
         if (touched[i] && wet[i] && !memory->dead[i])
             nodes->debt[i] += sum[g] / members[g];
     }
     // a group without a wet node left: its volume flies with its live nodes, or goes to the nearest wet node
     for (int i = 0; i < n; i++) {
-        const int g = group_find(parent, i);
+        const int g = silt_group_find(parent, i);
         if (g != i || members[g] || sum[g] == 0)
             continue;
         int heir = -1;
@@ -348,7 +332,7 @@ static void book_volume(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *m
         for (int k = 0; k < n; k++) {
             if (memory->dead[k])
                 continue;
-            const bool own = group_find(parent, k) == g && nodes->kind[k] == NODE_FLUID;
+            const bool own = silt_group_find(parent, k) == g && nodes->kind[k] == NODE_FLUID;
             if (!own && !wet[k])
                 continue;
             const double distance = own ? -1 : hypot(nodes->x[2 * k] - nodes->x[2 * i], nodes->x[2 * k + 1] - nodes->x[2 * i + 1]);
