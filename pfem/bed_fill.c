@@ -52,6 +52,7 @@ static int region_corners(const silt_region *region, double size) {
     case REGION_POLYGON:
         return region->n_point;
     case REGION_CIRCLE:
+    case REGION_SPHERE:
         break;
     }
     const double n = 2 * M_PI * region->radius / size;

@@ -95,15 +95,15 @@ static void hold_nodes(silt_fluid *f, const silt_scene *scene, const silt_walls 
     if (!scene->bed.on || scene->bed.condition == WALL_NO_SLIP)
         return;
     // slip on the bed: the normal of its edges around the node
-    for (int k = 0; k < mesh->n_edge; k++) {
-        if (mesh->edge_kind[k] != EDGE_BED)
+    for (int k = 0; k < mesh->n_facet; k++) {
+        if (mesh->facet_kind[k] != FACET_BED)
             continue;
-        const int a = mesh->edge[k][0], b = mesh->edge[k][1];
+        const int a = mesh->facet[k][0], b = mesh->facet[k][1];
         const double dx = nodes->x[2 * b] - nodes->x[2 * a], dy = nodes->x[2 * b + 1] - nodes->x[2 * a + 1];
         for (int c = 0; c < 2; c++) {
-            f->normal[2 * mesh->edge[k][c]] -= dy;
-            f->normal[2 * mesh->edge[k][c] + 1] += dx;
-            f->hold[mesh->edge[k][c]] = 1;
+            f->normal[2 * mesh->facet[k][c]] -= dy;
+            f->normal[2 * mesh->facet[k][c] + 1] += dx;
+            f->hold[mesh->facet[k][c]] = 1;
         }
     }
     for (int i = 0; i < f->n_node; i++)
@@ -215,12 +215,12 @@ static void wall_friction(silt_fluid *f, const silt_scene *scene, const silt_wal
                           const silt_mesh *mesh) {
     memset(f->friction, 0, (size_t)f->n_node * sizeof *f->friction);
     const double h = scene->fluid.size, rho = scene->fluid.density, nu = scene->fluid.viscosity / rho;
-    for (int k = 0; k < mesh->n_edge; k++) {
-        const int *edge = mesh->edge[k];
+    for (int k = 0; k < mesh->n_facet; k++) {
+        const int *edge = mesh->facet[k];
         double roughness = -1;
-        if (mesh->edge_kind[k] == EDGE_BED && scene->bed.condition == WALL_LAW)
+        if (mesh->facet_kind[k] == FACET_BED && scene->bed.condition == WALL_LAW)
             roughness = 2.5 * scene->grains.diameter;
-        else if (mesh->edge_kind[k] == EDGE_WALL)
+        else if (mesh->facet_kind[k] == FACET_WALL)
             for (int s = 0; s < 2; s++)
                 for (int t = 0; t < 2; t++)
                     if (nodes->wall[edge[0]][s] >= 0 && nodes->wall[edge[0]][s] == nodes->wall[edge[1]][t])

@@ -43,5 +43,7 @@ void silt_formula_velocity(const silt_formula *formula, double g, const double *
     case FORMULA_STANDING_WAVE:
         formula_standing_wave(formula, g, x, v);
         break;
+    default:
+        break;
     }
 }

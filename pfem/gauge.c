@@ -128,8 +128,8 @@ static double gauge_front(silt_gauges *g, const silt_view *view, double sign) {
 // highest point of the boundary of connected water on the vertical line at x
 static double gauge_height(silt_gauges *g, const silt_view *view, double x) {
     double top = -HUGE_VAL;
-    for (int i = 0; i < view->mesh->n_edge; i++) {
-        const int *edge = view->mesh->edge[i];
+    for (int i = 0; i < view->mesh->n_facet; i++) {
+        const int *edge = view->mesh->facet[i];
         const double *a = view->nodes->x + 2 * edge[0], *b = view->nodes->x + 2 * edge[1];
         if (x < silt_min(a[0], b[0]) || x > silt_max(a[0], b[0]) || gauge_root(g->parent, edge[0]) != g->main)
             continue;
@@ -151,8 +151,8 @@ static bool gauge_point(const silt_view *view, const double point[2], int node[3
     }
     double best = silt_square(GAUGE_REACH * view->scene->fluid.size);
     bool found = false;
-    for (int i = 0; i < view->mesh->n_edge; i++) {
-        const int *edge = view->mesh->edge[i];
+    for (int i = 0; i < view->mesh->n_facet; i++) {
+        const int *edge = view->mesh->facet[i];
         const double *a = x + 2 * edge[0], *b = x + 2 * edge[1];
         double ex = b[0] - a[0], ey = b[1] - a[1];
         double s = ((point[0] - a[0]) * ex + (point[1] - a[1]) * ey) / (ex * ex + ey * ey);

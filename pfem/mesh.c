@@ -1,7 +1,7 @@
 // the water's triangles: adjacency, boundary and measures; what is water is decided in remesh.c
 #include "pfem.h"
 
-double silt_cell_area(const double *x, const int cell[3]) {
+double silt_cell_area(const double *x, const int *cell) {
     const double *a = x + 2 * cell[0], *b = x + 2 * cell[1], *c = x + 2 * cell[2];
     return 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
 }
@@ -12,8 +12,8 @@ int silt_group_find(int *parent, int i) {
     return i;
 }
 
-void silt_group_join(int *parent, const int cell[3]) {
-    for (int a = 1; a < 3; a++) {
+void silt_group_join(int *parent, const int *cell) {
+    for (int a = 1; a < 4 && cell[a] >= 0; a++) {
         const int p = silt_group_find(parent, cell[0]), q = silt_group_find(parent, cell[a]);
         parent[p > q ? p : q] = p > q ? q : p;
     }
@@ -26,26 +26,26 @@ double silt_mesh_volume(const silt_mesh *mesh, const double *x) {
     return sum;
 }
 
-static silt_edge_kind edge_kind(const silt_nodes *nodes, int a, int b) {
+static silt_facet_kind facet_kind(const silt_nodes *nodes, int a, int b) {
     const silt_node_kind ka = nodes->kind[a], kb = nodes->kind[b];
     if (ka == NODE_INLET && kb == NODE_INLET)
-        return EDGE_INLET;
+        return FACET_INLET;
     if (ka == NODE_BED && kb == NODE_BED)
-        return EDGE_BED;
+        return FACET_BED;
     if (ka == NODE_BODY && kb == NODE_BODY && nodes->owner[a] == nodes->owner[b])
-        return EDGE_BODY;
+        return FACET_BODY;
     // on one wall segment, tank corners count for both of theirs; inlets and the bed end on walls
     for (int s = 0; s < 2; s++)
         for (int t = 0; t < 2; t++)
             if (nodes->wall[a][s] >= 0 && nodes->wall[a][s] == nodes->wall[b][t])
-                return EDGE_WALL;
+                return FACET_WALL;
     const bool fixed_a = ka == NODE_CORNER || ka == NODE_BED || ka == NODE_INLET;
     const bool fixed_b = kb == NODE_CORNER || kb == NODE_BED || kb == NODE_INLET;
     if (fixed_a && fixed_b)
-        return EDGE_WALL;
+        return FACET_WALL;
     if ((fixed_a && nodes->wall[b][0] >= 0) || (fixed_b && nodes->wall[a][0] >= 0))
-        return EDGE_WALL;
-    return EDGE_FREE;
+        return FACET_WALL;
+    return FACET_FREE;
 }
 
 static int compare_int(const void *a, const void *b) {
@@ -82,7 +82,7 @@ void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes) {
             mesh->node_cell[--start[mesh->cell[e][a]]] = e;
 
     // neighbours, the node itself included, rising; an edge that only one cell has is boundary
-    mesh->n_edge = 0;
+    mesh->n_facet = 0;
     int filled = 0;
     for (int i = 0; i < n; i++) {
         int *list = mesh->neighbour + filled, count = 0;
@@ -113,23 +113,24 @@ void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes) {
             }
             if (twice)
                 continue;
-            SILT_RESERVE(mesh->edge, mesh->edge_capacity, mesh->n_edge + 1);
-            SILT_RESERVE(mesh->edge_kind, mesh->edge_kind_capacity, mesh->n_edge + 1);
-            mesh->edge[mesh->n_edge][0] = i;
-            mesh->edge[mesh->n_edge][1] = j;
-            mesh->edge_kind[mesh->n_edge++] = (uint8_t)edge_kind(nodes, i, j);
+            SILT_RESERVE(mesh->facet, mesh->facet_capacity, mesh->n_facet + 1);
+            SILT_RESERVE(mesh->facet_kind, mesh->facet_kind_capacity, mesh->n_facet + 1);
+            mesh->facet[mesh->n_facet][0] = i;
+            mesh->facet[mesh->n_facet][1] = j;
+            mesh->facet[mesh->n_facet][2] = -1;
+            mesh->facet_kind[mesh->n_facet++] = (uint8_t)facet_kind(nodes, i, j);
         }
     }
     mesh->neighbour_start[n] = filled;
-    for (int k = 0; k < mesh->n_edge; k++)
-        if (mesh->edge_kind[k] == EDGE_FREE)
-            mesh->surface[mesh->edge[k][0]] = mesh->surface[mesh->edge[k][1]] = 1;
+    for (int k = 0; k < mesh->n_facet; k++)
+        if (mesh->facet_kind[k] == FACET_FREE)
+            mesh->surface[mesh->facet[k][0]] = mesh->surface[mesh->facet[k][1]] = 1;
 }
 
 void silt_mesh_clear(silt_mesh *mesh) {
     free(mesh->cell);
-    free(mesh->edge);
-    free(mesh->edge_kind);
+    free(mesh->facet);
+    free(mesh->facet_kind);
     free(mesh->wet);
     free(mesh->surface);
     free(mesh->node_cell_start);
@@ -137,4 +138,29 @@ void silt_mesh_clear(silt_mesh *mesh) {
     free(mesh->neighbour_start);
     free(mesh->neighbour);
     *mesh = (silt_mesh){0};
+}
+
+void silt_cell_corners(const silt_mesh *mesh, const double *x, const int *cell, double *corner) {
+    const int dim = mesh->dim == 3 ? 3 : 2;
+    for (int a = 0; a <= dim; a++)
+        for (int d = 0; d < dim; d++) {
+            double step = x[dim * cell[a] + d] - x[dim * cell[0] + d];
+            if (mesh->period[d] > 0)
+                step -= mesh->period[d] * floor(step / mesh->period[d] + 0.5);
+            corner[dim * a + d] = x[dim * cell[0] + d] + step;
+        }
+}
+
+double silt_cell_volume(const silt_mesh *mesh, const double *x, int e) {
+    double c[12];
+    silt_cell_corners(mesh, x, mesh->cell[e], c);
+    if (mesh->dim != 3)
+        return 0.5 * ((c[2] - c[0]) * (c[5] - c[1]) - (c[3] - c[1]) * (c[4] - c[0]));
+    double u[3], v[3], w[3];
+    for (int d = 0; d < 3; d++) {
+        u[d] = c[3 + d] - c[d];
+        v[d] = c[6 + d] - c[d];
+        w[d] = c[9 + d] - c[d];
+    }
+    return (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6;
 }

@@ -138,11 +138,11 @@ static void carry_slip(silt_run *run) {
     silt_nodes *nodes = &run->nodes;
     double *fresh = run->fluid.scratch;
     memcpy(fresh, nodes->v, 2 * (size_t)fluid->n_node * sizeof(double));
-    for (int k = 0; k < mesh->n_edge; k++) {
-        if (mesh->edge_kind[k] != EDGE_BED)
+    for (int k = 0; k < mesh->n_facet; k++) {
+        if (mesh->facet_kind[k] != FACET_BED)
             continue;
         for (int c = 0; c < 2; c++) {
-            const int i = mesh->edge[k][c], up = mesh->edge[k][1 - c];
+            const int i = mesh->facet[k][c], up = mesh->facet[k][1 - c];
             if (fluid->hold[i] != 1)
                 continue;
             const double dx = run->x_old[2 * i] - run->x_old[2 * up], dy = run->x_old[2 * i + 1] - run->x_old[2 * up + 1];
@@ -190,7 +190,7 @@ static void remember_bed(silt_run *run) {
     silt_memory *memory = &run->memory;
     const int *node = run->bed.fluid_node;
     for (int k = 0; k < run->n_freed; k++) {
-        const int cell[3] = {node[run->freed[k][0]], node[run->freed[k][1]], node[run->freed[k][2]]};
+        const int cell[4] = {node[run->freed[k][0]], node[run->freed[k][1]], node[run->freed[k][2]], -1};
         if (cell[0] < 0 || cell[1] < 0 || cell[2] < 0)
             continue;
         SILT_RESERVE(memory->cell, memory->cell_capacity, memory->n_cell + 1);
@@ -199,7 +199,7 @@ static void remember_bed(silt_run *run) {
         memory->area[memory->n_cell++] = run->freed_area[k];
     }
     for (int k = 0; k < run->n_grown; k++) {
-        const int cell[3] = {node[run->grown[k][0]], node[run->grown[k][1]], node[run->grown[k][2]]};
+        const int cell[4] = {node[run->grown[k][0]], node[run->grown[k][1]], node[run->grown[k][2]], -1};
         if (cell[0] < 0 || cell[1] < 0 || cell[2] < 0)
             continue;
         SILT_RESERVE(memory->taken, memory->taken_capacity, memory->n_taken + 1);

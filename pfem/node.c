@@ -5,6 +5,7 @@ void silt_nodes_clear(silt_nodes *nodes) {
     free(nodes->x);
     free(nodes->v);
     free(nodes->p);
+    free(nodes->h);
     free(nodes->debt);
     free(nodes->id);
     free(nodes->kind);
@@ -27,6 +28,8 @@ static void nodes_reserve(silt_nodes *nodes, int need) {
     GROW(x, 2);
     GROW(v, 2);
     GROW(p, 1);
+    if (nodes->h)
+        GROW(h, 1);
     GROW(debt, 1);
     GROW(id, 1);
     GROW(kind, 1);
@@ -36,7 +39,7 @@ static void nodes_reserve(silt_nodes *nodes, int need) {
     nodes->capacity = capacity;
 }
 
-int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double x[2]) {
+int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double *x) {
     const int i = nodes->count;
     nodes_reserve(nodes, i + 1);
     nodes->count++;
@@ -45,11 +48,13 @@ int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const doub
         nodes->v[2 * i + d] = 0;
     }
     nodes->p[i] = 0;
+    if (nodes->h)
+        nodes->h[i] = 0;
     nodes->debt[i] = 0;
     nodes->id[i] = nodes->next_id++;
     nodes->kind[i] = (uint8_t)kind;
     nodes->owner[i] = owner;
-    nodes->wall[i][0] = nodes->wall[i][1] = -1;
+    nodes->wall[i][0] = nodes->wall[i][1] = nodes->wall[i][2] = -1;
     return i;
 }
 
@@ -65,9 +70,11 @@ void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map) {
             for (int d = 0; d < 2; d++) {
                 nodes->x[2 * k + d] = nodes->x[2 * i + d];
                 nodes->v[2 * k + d] = nodes->v[2 * i + d];
-                nodes->wall[k][d] = nodes->wall[i][d];
             }
+            memcpy(nodes->wall[k], nodes->wall[i], sizeof nodes->wall[k]);
             nodes->p[k] = nodes->p[i];
+            if (nodes->h)
+                nodes->h[k] = nodes->h[i];
             nodes->debt[k] = nodes->debt[i];
             nodes->id[k] = nodes->id[i];
             nodes->kind[k] = nodes->kind[i];

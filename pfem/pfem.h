@@ -1,6 +1,7 @@
 /** @file pfem.h
  * The data model on a page, in the order of the flow: nodes -> mesh -> fluid -> bed -> coupling -> ledger -> run.
- * Vectors are interleaved, `dim` numbers a node; in 2-D masses, volumes and forces are per metre of width.
+ * Vectors are interleaved, `dim` numbers a node; in 2-D masses, volumes and forces are per metre of width. Cells are triangles
+ * (the fourth node is -1) or tetrahedra, facets their edges (third node -1) or faces.
  * All structs are valid when zeroed. "owned": freed by the struct's own *_clear.
  */
 #ifndef SILT_PFEM_H
@@ -14,43 +15,77 @@ typedef struct silt_bed silt_bed;
 
 typedef enum {
     NODE_FLUID = 0, // a particle of water: moves with its velocity; may slide or stick on tank walls (wall[])
-    NODE_CORNER,    // fixed at a vertex of the tank's outline that points into the water
+    NODE_CORNER,    // stays at a vertex or crease of the walls that points into the water; owner: element of the walls
     NODE_BED,       // on the bed's surface, fixed while the bed stands; owner: bed node
     NODE_BODY,      // on the outline of a rigid object, moves with it; owner: body
     NODE_INLET,     // stays on the inlet line, velocity prescribed; owner: inlet
 } silt_node_kind;
 
 typedef struct silt_nodes {
+    int dim;         // 2 or 3; 0 counts as 2
     int count;
     int capacity;
-    double *x;       // owned, position, m
-    double *v;       // owned, velocity, m/s
+    double *x;       // owned, dim per node, position, m
+    double *v;       // owned, dim per node, velocity, m/s
     double *p;       // owned, pressure, Pa
+    double *h;       // owned, wanted distance to the neighbours, m; NULL where it is fluid.size everywhere (silt_node_h)
     double *debt;    // owned, m3: volume that remeshing took from the water here and that is owed to it (negative: too much)
     int64_t *id;     // owned, never used twice
     uint8_t *kind;   // owned, silt_node_kind
     int *owner;      // owned, see silt_node_kind, else -1
-    int (*wall)[2];  // owned, segments of silt_walls that the node lies on, -1
+    int (*wall)[3];  // owned, elements of silt_walls that the node lies on (two in a crease, three in a corner), -1
     int64_t next_id;
 } silt_nodes;
 
+static inline int silt_nodes_dim(const silt_nodes *nodes) { return nodes->dim == 3 ? 3 : 2; }
+/** wanted distance of node i to its neighbours; size: fluid.size */
+static inline double silt_node_h(const silt_nodes *nodes, int i, double size) { return nodes->h ? nodes->h[i] : size; }
+
 // ---------------------------------------------------------------- walls (wall.c)
 
-/** the tank's straight segments, water on the left of from -> to */
+/** where a moving wall of the scene stands and how it moves */
+typedef struct silt_wall_motion {
+    double shift[3], angle;   // m and rad, from the place in the scene; in 3-D the angle is about the y axis
+    double velocity[3], spin; // m/s of the centre, rad/s
+    double centre[3];         // m, what it turns about, at its present place
+} silt_wall_motion;
+
+/** The tank: flat elements, segments in 2-D (water on the left of from -> to), triangles in 3-D (counter-clockwise as the
+ * water sees them). */
 typedef struct silt_walls {
+    int dim;
     int count;
-    double (*from)[2], (*to)[2]; // owned, m
-    double (*normal)[2];         // owned, unit, into the water
+    double (*from)[2], (*to)[2]; // owned, m, 2-D: ends of the segment
+    double (*corner)[3][3];      // owned, m, 3-D: corners of the triangle
+    double (*normal)[3];         // owned, unit, into the water
+    int *wall;                   // owned, index in scene->wall
+    int *patch;                  // owned, elements that bend gently into each other share a number: nodes of one patch
     uint8_t *slip;               // owned, 1: water slides along
     double *roughness;           // owned, m, k_s of the wall law, 0 smooth, -1: no wall law
-    int *next, *previous;        // owned, segment joined at `to` / at `from`, -1
+    int *next, *previous;        // owned, 2-D: segment joined at `to` / at `from`, -1
+    int (*joined)[3];            // owned, 3-D: element across the edge that starts at each corner, -1
+    int n_wall;
+    silt_wall_motion *motion;    // owned, one per wall of the scene
+    struct silt_wall_index *index; // owned, elements by place (wall.c)
 } silt_walls;
+
+/** which components of a node's velocity are held */
+typedef enum { HOLD_FREE = 0, HOLD_NORMAL, HOLD_ALL, HOLD_LINE } silt_hold; // LINE: free along one direction only
 
 void silt_walls_create(silt_walls *walls, const silt_scene *scene);
 void silt_walls_clear(silt_walls *walls);
-/** Signed distance of a point to the nearest segment, positive on the water's side; *segment is that segment (-1: no walls,
- * distance +inf). At a vertex the side is decided by the two segments that meet there. */
-double silt_walls_distance(const silt_walls *walls, const double *point, int *segment);
+/** Places the walls that move where they are at `time`; their velocities are those that carry them there from `time - dt`.
+ * @param dt  s, the step that ends at `time`; 0: the velocity of that moment */
+void silt_walls_move(silt_walls *walls, const silt_scene *scene, double time, double dt);
+/** How the elements hold a node: vector is the unit normal (HOLD_NORMAL) or the free direction (HOLD_LINE) */
+silt_hold silt_walls_hold(const silt_walls *walls, const int element[3], double vector[3]);
+/** velocity of the wall's material at x, m/s: its motion and its surface velocity */
+void silt_walls_velocity(const silt_walls *walls, const silt_scene *scene, int element, const double *x, double v[3]);
+/** true when the nodes share a patch: a facet between them lies on the wall */
+bool silt_walls_share(const silt_walls *walls, int n, const int *const element[]);
+/** Signed distance of a point to the nearest element, positive on the water's side; *element is that element (-1: no walls,
+ * distance +inf). At a vertex the side is decided by the elements that meet there. */
+double silt_walls_distance(const silt_walls *walls, const double *point, int *element);
 /** Nodes that lie on walls: puts them exactly on, lets them turn corners, attaches what has come through or touches. */
 void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double *x_old, const uint8_t *interior, double h);
 
@@ -58,7 +93,7 @@ void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double
 
 void silt_nodes_clear(silt_nodes *nodes);
 /** appends a node with zero fields; @return its index */
-int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double x[2]);
+int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double *x);
 /** Removes nodes with dead[i] != 0, keeps the order; map[i] is the new index or -1 */
 void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map);
 /** Fills the scene's regions with water nodes, inlets and tank corners; leaves out what lies in `solid` (bed, bodies). */
@@ -68,35 +103,54 @@ void silt_nodes_seed(silt_nodes *nodes, const silt_scene *scene, const silt_wall
 /** Points along a closed outline at spacing h, corners kept. @return how many; xy malloc'ed, owned by the caller */
 int silt_outline_points(int n, const double *outline, double h, double **xy);
 
+// ---------------------------------------------------------------- size field (size.c)
+
+typedef struct silt_size silt_size; // NULL: fluid.size everywhere
+/** Made from fluid.sizes; NULL without them. */
+void silt_size_create(silt_size **size, const silt_scene *scene, const silt_walls *walls);
+/** Follows what moves (surface, bed, bodies, walls) and writes nodes->h. */
+struct silt_mesh;
+void silt_size_update(silt_size *size, silt_nodes *nodes, const struct silt_mesh *mesh);
+/** wanted distance between nodes at a point, m (at the last update); size NULL: fluid.size */
+double silt_size_at(const silt_size *size, const silt_scene *scene, const double *x);
+void silt_size_free(silt_size **size);
+
 // ---------------------------------------------------------------- mesh (mesh.c)
 
-typedef enum { EDGE_FREE = 0, EDGE_WALL, EDGE_BED, EDGE_BODY, EDGE_INLET } silt_edge_kind;
+/** kinds of boundary facets */
+typedef enum { FACET_FREE = 0, FACET_WALL, FACET_BED, FACET_BODY, FACET_INLET } silt_facet_kind;
 
 typedef struct silt_mesh {
     int64_t revision;  // rises at every rebuild; what is derived from the topology remembers it
+    int dim;           // 2 or 3; 0 counts as 2
+    double period[3];  // m, length of the domain where it is periodic, else 0: cells join nodes across it by the shortest way
     int n_node;        // nodes that the arrays below were made for
     int n_cell;
     int cell_capacity;
-    int (*cell)[3];    // owned, nodes, counter-clockwise: the water's triangles
-    int n_edge;
-    int edge_capacity;
-    int (*edge)[2];    // owned, the water's boundary, water on the left
-    uint8_t *edge_kind; // owned, silt_edge_kind
+    int (*cell)[4];    // owned, nodes of the water's cells: counter-clockwise triangles (cell[3] = -1), or tetrahedra of positive volume
+    int n_facet;
+    int facet_capacity;
+    int (*facet)[3];   // owned, the water's boundary: edges with water on the left (facet[2] = -1), or faces, counter-clockwise from outside
+    uint8_t *facet_kind; // owned, silt_facet_kind
     uint8_t *wet;      // owned, one per node: 1 when the node has a cell
-    uint8_t *surface;  // owned, one per node: 1 when the node has a free edge
+    uint8_t *surface;  // owned, one per node: 1 when the node has a free facet
     int *node_cell_start, *node_cell; // owned, cells of a node (start has n_node + 1)
     int *neighbour_start, *neighbour; // owned, nodes joined to a node by an edge, itself included, rising
     int wet_capacity, surface_capacity, start_capacity, neighbour_start_capacity, node_cell_capacity, neighbour_capacity;
-    int edge_kind_capacity;
+    int facet_kind_capacity;
 } silt_mesh;
 
-/** Derived data of the topology: adjacency, boundary edges, wet and surface flags. Raises the revision. */
+/** Derived data of the topology: adjacency, boundary facets, wet and surface flags. Raises the revision. */
 void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes);
 void silt_mesh_clear(silt_mesh *mesh);
-double silt_cell_area(const double *x, const int cell[3]);
+double silt_cell_area(const double *x, const int *cell); // 2-D
+/** m2 or m3 of a cell of the mesh, across a periodic border too */
+double silt_cell_volume(const silt_mesh *mesh, const double *x, int e);
+/** corners of a cell, dim numbers each, joined the shortest way across a periodic border */
+void silt_cell_corners(const silt_mesh *mesh, const double *x, const int *cell, double *corner);
 /** Groups of nodes (parent[i] = i at the start): the group's lowest node; and one group of a cell's three */
 int silt_group_find(int *parent, int i);
-void silt_group_join(int *parent, const int cell[3]);
+void silt_group_join(int *parent, const int *cell); // a cell's nodes (cell[3] < 0: three) into one group
 /** m3, sum of the cells */
 double silt_mesh_volume(const silt_mesh *mesh, const double *x);
 
@@ -105,13 +159,13 @@ double silt_mesh_volume(const silt_mesh *mesh, const double *x);
 #define NODE_LEFT 2
 typedef struct silt_memory {
     int n_cell, cell_capacity, area_capacity;
-    int (*cell)[3];   // owned, cells that were water: the old mesh, and bed cells that became water
+    int (*cell)[4];   // owned, cells that were water: the old mesh, and bed cells that became water
     double *area;     // owned, m2, what each of them held before the cloud was edited
     int n_taken, taken_capacity, taken_area_capacity;
-    int (*taken)[3];  // owned, bed cells that grew into the water
+    int (*taken)[4];  // owned, bed cells that grew into the water
     double *taken_area; // owned, m2
     int n_node, flag_capacity, dead_capacity;
-    uint8_t *interior; // owned, one per node: had cells and no free edge
+    uint8_t *interior; // owned, one per node: had cells and no free facet
     uint8_t *dead;     // owned, one per node: leaves the cloud at the rebuild; NODE_LEFT: takes its water out of the domain
     double reconnected;     // m3, volume that the rebuild itself made (positive) or lost
     double left;            // m3, volume that went with the nodes that left

@@ -89,10 +89,10 @@ static void refine_crowded(refinement *r) {
 // inner nodes pressed against a wall, the bed or a body
 static void refine_flat(refinement *r) {
     const double *x = r->nodes->x;
-    for (int k = 0; k < r->mesh->n_edge; k++) {
-        if (r->mesh->edge_kind[k] == EDGE_FREE || r->mesh->edge_kind[k] == EDGE_INLET)
+    for (int k = 0; k < r->mesh->n_facet; k++) {
+        if (r->mesh->facet_kind[k] == FACET_FREE || r->mesh->facet_kind[k] == FACET_INLET)
             continue;
-        const int a = r->mesh->edge[k][0], b = r->mesh->edge[k][1];
+        const int a = r->mesh->facet[k][0], b = r->mesh->facet[k][1];
         for (int m = r->mesh->node_cell_start[a]; m < r->mesh->node_cell_start[a + 1]; m++) {
             const int *cell = r->mesh->cell[r->mesh->node_cell[m]];
             int third = -1;
@@ -152,8 +152,8 @@ static void refine_stretched(refinement *r) {
         silt_memory_extend(r->memory, nodes->count);
         // inside unless it sits on a boundary edge
         bool boundary = wall[0] >= 0;
-        for (int k = 0; k < r->mesh->n_edge && !boundary; k++)
-            boundary = r->mesh->edge[k][0] == a && r->mesh->edge[k][1] == b;
+        for (int k = 0; k < r->mesh->n_facet && !boundary; k++)
+            boundary = r->mesh->facet[k][0] == a && r->mesh->facet[k][1] == b;
         r->memory->interior[i] = !boundary;
         for (int c = 0; c < 3; c++)
             r->locked[cell[c]] = 1;

@@ -132,6 +132,7 @@ bool silt_region_contains(const silt_region *region, const double *x) {
     case REGION_POLYGON:
         return silt_polygon_contains(region->n_point, region->point, x);
     case REGION_CIRCLE:
+    case REGION_SPHERE:
         return silt_square(x[0] - region->centre[0]) + silt_square(x[1] - region->centre[1]) <=
                silt_square(region->radius);
     }
@@ -145,6 +146,7 @@ double silt_region_area(const silt_region *region) {
     case REGION_POLYGON:
         return silt_polygon_area(region->n_point, region->point);
     case REGION_CIRCLE:
+    case REGION_SPHERE:
         return M_PI * silt_square(region->radius);
     }
     return 0;

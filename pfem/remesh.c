@@ -40,7 +40,8 @@ bool silt_barrier_contains(const silt_barrier *barrier, const double point[2]) {
 typedef struct cell_set {
     int *slot; // index + 1 of the cell, 0 empty
     size_t mask;
-    const int (*cell)[3];
+    const int *cell; // `stride` numbers a cell
+    int stride;
 } cell_set;
 
 static void cell_key(const int cell[3], int key[3]) {
@@ -63,16 +64,17 @@ static size_t cell_hash(const int key[3]) {
     return (size_t)(z * 0x9e3779b97f4a7c15u >> 17);
 }
 
-static void set_create(cell_set *set, int n, const int (*cell)[3]) {
+static void set_create(cell_set *set, int n, int stride, const int *cell) {
     size_t size = 16;
     while (size < 2 * (size_t)n + 2)
         size *= 2;
     set->slot = silt_alloc(size, sizeof *set->slot);
     set->mask = size - 1;
     set->cell = cell;
+    set->stride = stride;
     for (int e = 0; e < n; e++) {
         int key[3];
-        cell_key(cell[e], key);
+        cell_key(cell + stride * e, key);
         size_t k = cell_hash(key) & set->mask;
         while (set->slot[k])
             k = (k + 1) & set->mask;
@@ -85,7 +87,7 @@ static int set_find(const cell_set *set, const int cell[3]) {
     int key[3], other[3];
     cell_key(cell, key);
     for (size_t k = cell_hash(key) & set->mask; set->slot[k]; k = (k + 1) & set->mask) {
-        cell_key(set->cell[set->slot[k] - 1], other);
+        cell_key(set->cell + set->stride * (set->slot[k] - 1), other);
         if (other[0] == key[0] && other[1] == key[1] && other[2] == key[2])
             return set->slot[k] - 1;
     }
@@ -156,7 +158,8 @@ static silt_status cloud_triangles(const silt_nodes *nodes, const uint8_t *dead,
 
 static void mesh_push(silt_mesh *mesh, const int cell[3]) {
     SILT_RESERVE(mesh->cell, mesh->cell_capacity, mesh->n_cell + 1);
-    memcpy(mesh->cell[mesh->n_cell++], cell, sizeof mesh->cell[0]);
+    memcpy(mesh->cell[mesh->n_cell], cell, 3 * sizeof *cell);
+    mesh->cell[mesh->n_cell++][3] = -1;
 }
 
 silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
@@ -190,8 +193,8 @@ static void choose_cells(silt_mesh *mesh, const silt_nodes *nodes, const silt_sc
                          const silt_memory *memory, const int *triangle, int n_triangle, uint8_t *kept) {
     const double h = scene->fluid.size;
     cell_set old, fresh;
-    set_create(&old, memory->n_cell, (const int(*)[3])memory->cell);
-    set_create(&fresh, n_triangle, (const int(*)[3])triangle);
+    set_create(&old, memory->n_cell, 4, memory->n_cell ? memory->cell[0] : NULL);
+    set_create(&fresh, n_triangle, 3, triangle);
 
     // old cells that the new triangulation has not: new cells in there are water too
     silt_mesh gone = {0};
@@ -247,7 +250,7 @@ static void book_volume(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *m
     for (int i = 0; i < n; i++)
         parent[i] = i;
     cell_set old;
-    set_create(&old, memory->n_cell, (const int(*)[3])memory->cell);
+    set_create(&old, memory->n_cell, 4, memory->n_cell ? memory->cell[0] : NULL);
 
     double made = 0;
     for (int e = 0; e < memory->n_cell; e++)

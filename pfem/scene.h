@@ -17,20 +17,22 @@ typedef struct silt_series {
     char *path;    // owned, the file as it was opened
 } silt_series;
 
-typedef enum { REGION_BOX = 1, REGION_POLYGON, REGION_CIRCLE } silt_region_kind;
-/** a closed part of the plane */
+typedef enum { REGION_BOX = 1, REGION_POLYGON, REGION_CIRCLE, REGION_SPHERE } silt_region_kind;
+/** a closed part of the plane or of space; in 3-D a polygon stands upright as a prism in x-z from lo[1] to hi[1] */
 typedef struct silt_region {
     silt_region_kind kind;
     double lo[3], hi[3];      // box
     int n_point;              // polygon, counter-clockwise after reading
     double *point;            // owned, 3 per point
-    double centre[3], radius; // circle
+    double centre[3], radius; // circle, sphere
+    char *outline;            // owned, CSV file with the polygon's corners; NULL: given in the scene
 } silt_region;
 
 typedef enum {
     WALL_NO_SLIP = 0,
     WALL_SLIP,
     WALL_LAW, // slip with the traction of the logarithmic law of the wall
+    WALL_DEFAULT, // wall law where the flow is turbulent, no-slip where it is laminar; replaced while reading
 } silt_condition;
 /** a chain of straight wall segments with the water on its left */
 typedef struct silt_wall {
@@ -39,6 +41,13 @@ typedef struct silt_wall {
     bool closed;
     silt_condition condition;
     double roughness; // m, equivalent sand roughness k_s of the wall law; 0: smooth
+    double lo[3], hi[3]; // 3-D: key `box`, a closed box around the water; hi < lo: none
+    char *surface;       // owned, 3-D: STL or .msh file of a triangulated surface, NULL: none
+    double scale;        // 3-D: what the surface's coordinates are multiplied by
+    bool inside_out;     // 3-D: the surface's normals point out of the water
+    double velocity[3];  // m/s, of the wall's surface along itself (a lid, a belt)
+    silt_series motion;  // time, x, y, z in m and angle in degrees from the place in the scene (columns by name); n_row 0: stands still
+    double pivot[3];     // m, what `angle` turns about
 } silt_wall;
 
 /** water fed in through the segment from-to (water on its left) with a velocity */
@@ -47,12 +56,14 @@ typedef struct silt_inlet {
     double from[3], to[3];
     double velocity[3];  // m/s; multiplied by column 1 of the series when there is one
     silt_series series;  // n_row 0: constant; in the scene the name of a CSV file
+    silt_series head;    // water level over time (time, level), m: pressure-driven; n_row 0: velocity-driven
 } silt_inlet;
 
 /** nodes and grains that cross the segment from-to from left to right leave and are counted */
 typedef struct silt_outlet {
     char *name;
     double from[3], to[3];
+    double level; // m, water level kept behind it; NaN: free outfall
 } silt_outlet;
 
 typedef enum {
@@ -63,12 +74,32 @@ typedef enum {
     FORMULA_STRAIN,         // rate: v = (-rate x, rate y) about centre
     FORMULA_TAYLOR_GREEN,   // amplitude, length, centre (the box's corner)
     FORMULA_STANDING_WAVE,  // amplitude (m, of the surface), wavelength (length), depth, centre: bed at the left antinode
+    FORMULA_SOLITARY_WAVE,  // amplitude (height H), depth, centre: bed below the crest; sign of rate: direction
+    FORMULA_FIELD,          // CSV of points x,y[,z],vx,vy[,vz]: nearest three (four) points' plane, or the point itself
+    FORMULA_CENTRAL,        // rate: acceleration -rate^2 (x - centre)
+    FORMULA_SERIES,         // CSV over time: time, x, y, z
 } silt_formula_kind;
+/** a velocity at the start, or an acceleration (body force) */
 typedef struct silt_formula {
     silt_formula_kind kind;
-    double vector[3], centre[3];
+    double vector[3], centre[3]; // vector: the velocity, or added to the formula's
     double rate, amplitude, length, depth;
+    silt_series series; // FIELD, SERIES
 } silt_formula;
+
+/** how water flows in the small */
+typedef enum { FLOW_TURBULENT = 0, FLOW_LAMINAR } silt_flow;
+typedef enum { TURBULENCE_AUTO = 0, TURBULENCE_NONE, TURBULENCE_MIXING_LENGTH, TURBULENCE_SMAGORINSKY, TURBULENCE_WALE } silt_turbulence;
+typedef enum { RHEOLOGY_NEWTONIAN = 0, RHEOLOGY_BINGHAM, RHEOLOGY_HERSCHEL_BULKLEY } silt_rheology;
+
+/** where nodes stand closer or farther than fluid.size */
+typedef enum { NEAR_REGION = 1, NEAR_WALLS, NEAR_BED, NEAR_BODIES, NEAR_SURFACE } silt_near;
+typedef struct silt_size_def {
+    silt_near near;     // what the size belongs to
+    silt_region region; // NEAR_REGION
+    double size;        // m
+    double distance;    // m, how far around it the size holds
+} silt_size_def;
 
 typedef enum { SCHEME_IMPLICIT = 0, SCHEME_FRACTIONAL } silt_scheme;
 typedef enum { PRESSURE_CONSISTENT = 0, PRESSURE_LAPLACIAN } silt_pressure_operator;
@@ -80,7 +111,15 @@ typedef struct silt_fluid_def {
     double size;      // m, node spacing h, required
     silt_scheme scheme;             // scheme: implicit | fractional
     silt_pressure_operator pressure; // pressure: consistent | laplacian
-    double theta;        // 0.5 to 1, implicitness of the step
+    silt_flow flow;             // flow: turbulent | laminar
+    silt_turbulence turbulence; // auto: mixing-length in 2-D, wale in 3-D when the flow is turbulent, else none
+    double wall_height;  // times h, where the wall law samples the velocity
+    silt_rheology rheology;
+    double yield_stress; // Pa
+    double flow_index;   // n of Herschel-Bulkley: stress = yield_stress + viscosity rate^n
+    double plastic_rate; // 1/s, shear rate below which the yield stress is smoothed
+    int order;           // 2: trapezoidal in time, 1: backward Euler
+    double theta;        // 0.5 to 1, implicitness of the step; 0: what `order` says
     double alpha;        // 1.3, alpha shape of what was water a step ago, times h
     double merge;        // width of a gap between two surfaces that closes and becomes water, times h
     double tolerance;    // relative residual of the continuity equation
@@ -91,6 +130,14 @@ typedef struct silt_fluid_def {
     int seed;
     int n_region;
     silt_region *region; // owned
+    char *cloud;         // owned, CSV file of nodes x,y[,z][,vx,vy[,vz]] in place of the regular cloud; NULL: none
+    double shuffle;      // times h: inner nodes are shifted at random in every step (a test of remeshing)
+    double size_growth;  // largest change of size per distance
+    int n_size;
+    silt_size_def *size_at; // owned; key `sizes`
+    double air_pressure; // Pa, of closed air pockets at their making; 0: pockets have no pressure
+    double air_exponent; // 1.4
+    silt_formula force;  // acceleration besides gravity; key body_force
     int n_inlet;
     silt_inlet *inlet; // owned
     int n_outlet;
@@ -213,7 +260,8 @@ struct silt_scene {
     uint64_t hash;  // of resolved
     int version;    // silt: 1
     char *title;
-    int dimension;  // 2; 3 is refused until it exists
+    int dimension;  // 2 or 3
+    double period[2]; // m, x from period[0] to period[1] is periodic; equal: not
     struct {
         double end, output;    // s, required
         double step;           // s, largest dt; 0: none

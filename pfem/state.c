@@ -21,7 +21,7 @@
     X("nodes/id", STORE_LONG, run->nodes.id, 1)                                                                        \
     X("nodes/kind", STORE_BYTE, run->nodes.kind, 1)                                                                    \
     X("nodes/owner", STORE_INT, run->nodes.owner, 1)                                                                   \
-    X("nodes/wall", STORE_INT, run->nodes.wall, 2)
+    X("nodes/wall", STORE_INT, run->nodes.wall, 3)
 
 silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
     silt_store *store = NULL;
@@ -38,7 +38,7 @@ silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
     STATE_NODES(PUT)
 #undef PUT
     if (status == SILT_OK)
-        status = silt_store_put(store, "mesh/cell", STORE_INT, 3 * (size_t)run->mesh.n_cell, run->mesh.cell, err);
+        status = silt_store_put(store, "mesh/cell", STORE_INT, 4 * (size_t)run->mesh.n_cell, run->mesh.cell, err);
     if (status == SILT_OK)
         status = silt_store_put(store, "run/ledger", STORE_BYTE, sizeof run->ledger, &run->ledger, err);
     if (status == SILT_OK)
@@ -85,7 +85,7 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
     STATE_NODES(TAKE)
 #undef TAKE
     SILT_TRY(silt_store_count(store, "mesh/cell", &n_index, err));
-    run->mesh.n_cell = (int)(n_index / 3);
+    run->mesh.n_cell = (int)(n_index / 4);
     SILT_RESERVE(run->mesh.cell, run->mesh.cell_capacity, run->mesh.n_cell + 1);
     if (n_index)
         SILT_TRY(silt_store_take(store, "mesh/cell", STORE_INT, n_index, run->mesh.cell, err));

@@ -12,6 +12,10 @@ void silt_walls_create(silt_walls *walls, const silt_scene *scene) {
     walls->normal = silt_alloc(room, sizeof *walls->normal);
     walls->slip = silt_alloc(room, 1);
     walls->roughness = silt_alloc(room, sizeof *walls->roughness);
+    walls->wall = silt_alloc(room, sizeof *walls->wall);
+    walls->patch = silt_alloc(room, sizeof *walls->patch);
+    walls->n_wall = scene->n_wall;
+    walls->motion = silt_alloc((size_t)scene->n_wall + 1, sizeof *walls->motion);
     walls->next = silt_alloc(room, sizeof *walls->next);
     walls->previous = silt_alloc(room, sizeof *walls->previous);
 
@@ -28,6 +32,8 @@ void silt_walls_create(silt_walls *walls, const silt_scene *scene) {
             }
             walls->normal[s][0] = -dy / length;
             walls->normal[s][1] = dx / length;
+            walls->wall[s] = w;
+            walls->patch[s] = s;
             walls->slip[s] = wall->condition != WALL_NO_SLIP;
             walls->roughness[s] = wall->condition == WALL_LAW ? wall->roughness : -1;
         }
@@ -52,6 +58,9 @@ void silt_walls_clear(silt_walls *walls) {
     free(walls->normal);
     free(walls->slip);
     free(walls->roughness);
+    free(walls->wall);
+    free(walls->patch);
+    free(walls->motion);
     free(walls->next);
     free(walls->previous);
     *walls = (silt_walls){0};
@@ -201,4 +210,38 @@ void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double
             wall_attach(walls, nodes, i, x_old + 2 * i, interior[i] ? 0 : 0.1 * h);
     }
     wall_fill_corners(walls, nodes, 0.3 * h);
+}
+
+void silt_walls_move(silt_walls *walls, const silt_scene *scene, double time, double dt) {
+    (void)walls, (void)scene, (void)time, (void)dt;
+}
+
+silt_hold silt_walls_hold(const silt_walls *walls, const int element[3], double vector[3]) {
+    memset(vector, 0, 3 * sizeof *vector);
+    if (element[0] < 0)
+        return HOLD_FREE;
+    if (!walls->slip[element[0]] || element[1] >= 0)
+        return HOLD_ALL;
+    memcpy(vector, walls->normal[element[0]], 3 * sizeof *vector);
+    return HOLD_NORMAL;
+}
+
+void silt_walls_velocity(const silt_walls *walls, const silt_scene *scene, int element, const double *x, double v[3]) {
+    (void)x;
+    memcpy(v, scene->wall[walls->wall[element]].velocity, 3 * sizeof *v);
+}
+
+bool silt_walls_share(const silt_walls *walls, int n, const int *const element[]) {
+    for (int s = 0; s < 3; s++) {
+        bool all = element[0][s] >= 0;
+        for (int k = 1; k < n && all; k++) {
+            bool has = false;
+            for (int t = 0; t < 3; t++)
+                has |= element[k][t] >= 0 && walls->patch[element[k][t]] == walls->patch[element[0][s]];
+            all = has;
+        }
+        if (all)
+            return true;
+    }
+    return false;
 }

@@ -96,7 +96,8 @@ static inline void bench_water(bench *b, double x0, double y0, double x1, double
     assert_int_equal(silt_delaunay_2d(b->nodes.count, b->nodes.x, &triangle, &n), 0);
     for (int k = 0; k < n; k++) {
         SILT_RESERVE(b->mesh.cell, b->mesh.cell_capacity, b->mesh.n_cell + 1);
-        memcpy(b->mesh.cell[b->mesh.n_cell++], triangle + 3 * k, sizeof b->mesh.cell[0]);
+        const int cell[4] = {triangle[3 * k], triangle[3 * k + 1], triangle[3 * k + 2], -1};
+        memcpy(b->mesh.cell[b->mesh.n_cell++], cell, sizeof cell);
     }
     free(triangle);
     silt_mesh_connect(&b->mesh, &b->nodes);

@@ -52,7 +52,7 @@ static void tank_open(tank *t, int nx, int ny, double h) {
     for (int j = 0; j < ny; j++)
         for (int i = 0; i < nx; i++) {
             int a = j * (nx + 1) + i, b = a + 1, c = a + nx + 1, d = c + 1;
-            int two[2][3] = {{a, b, d}, {a, d, c}};
+            int two[2][4] = {{a, b, d, -1}, {a, d, c, -1}};
             memcpy(t->mesh.cell[t->mesh.n_cell], two, sizeof two);
             t->mesh.n_cell += 2;
         }

@@ -104,14 +104,14 @@ static void test_first_mesh_fills_the_region(void **state) {
     assert_true(fabs(silt_mesh_volume(&b.mesh, b.nodes.x) - 0.525) < 1e-12);
     // boundary: free on top, wall elsewhere; Euler: cells = 2 nodes - boundary edges - 2
     double top = 0;
-    for (int k = 0; k < b.mesh.n_edge; k++) {
-        const double *p = b.nodes.x + 2 * b.mesh.edge[k][0], *q = b.nodes.x + 2 * b.mesh.edge[k][1];
+    for (int k = 0; k < b.mesh.n_facet; k++) {
+        const double *p = b.nodes.x + 2 * b.mesh.facet[k][0], *q = b.nodes.x + 2 * b.mesh.facet[k][1];
         const bool on_top = p[1] > 0.5 - 1e-9 && q[1] > 0.5 - 1e-9;
-        assert_int_equal(b.mesh.edge_kind[k], on_top ? EDGE_FREE : EDGE_WALL);
+        assert_int_equal(b.mesh.facet_kind[k], on_top ? FACET_FREE : FACET_WALL);
         top += on_top ? hypot(q[0] - p[0], q[1] - p[1]) : 0;
     }
     assert_true(fabs(top - 1.5) < 1e-12);
-    assert_int_equal(b.mesh.n_cell, 2 * b.nodes.count - b.mesh.n_edge - 2);
+    assert_int_equal(b.mesh.n_cell, 2 * b.nodes.count - b.mesh.n_facet - 2);
     bench_close(&b);
 }
 

@@ -7,8 +7,8 @@
 // unit square of two cells, a drop of one cell, a flying node; velocity (1 + 2y, 3x), pressure 10 - 4y + x
 static double square_x[] = {0, 0, 1, 0, 1, 1, 0, 1, 2, 0, 2.2, 0, 2, 0.2, 3, 0.5};
 enum { SQUARE_NODES = 8 };
-static int square_cell[][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}};
-static int square_edge[][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 4}};
+static int square_cell[][4] = {{0, 1, 2, -1}, {0, 2, 3, -1}, {4, 5, 6, -1}};
+static int square_facet[][3] = {{0, 1, -1}, {1, 2, -1}, {2, 3, -1}, {3, 0, -1}, {4, 5, -1}, {5, 6, -1}, {6, 4, -1}};
 static double square_v[2 * SQUARE_NODES], square_p[SQUARE_NODES], square_solid[SQUARE_NODES];
 static int64_t square_id[SQUARE_NODES] = {10, 11, 12, 13, 14, 15, 16, 17};
 static uint8_t square_kind[SQUARE_NODES] = {NODE_CORNER, NODE_CORNER}, square_wet[] = {1, 1, 1, 1, 1, 1, 1, 0};
@@ -57,8 +57,8 @@ static void world_make(world *w) {
                           .n_node = SQUARE_NODES,
                           .n_cell = 3,
                           .cell = square_cell,
-                          .n_edge = 7,
-                          .edge = square_edge,
+                          .n_facet = 7,
+                          .facet = square_facet,
                           .wet = square_wet};
     w->bed = (silt_bed){.n_node = 4,
                         .x = bed_x,
