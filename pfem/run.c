@@ -272,7 +272,9 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
             return status;
         }
         run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
-        status = silt_fluid_step(&run->fluid, scene, &run->walls, &run->nodes, &run->mesh, run->drag, run->dt, err);
+        const silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .locator = &run->locator, .drag = run->drag,
+                                .nodes = &run->nodes, .time = run->time, .dt = run->dt};
+        status = silt_fluid_step(&run->fluid, &step, err);
         run->phase[PHASE_assemble] += run->fluid.seconds_assemble;
         run->phase[PHASE_solve] += run->fluid.seconds_solve;
         if (status == SILT_OK)
