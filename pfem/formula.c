@@ -52,27 +52,38 @@ static void formula_standing_wave(const silt_formula *f, double g, double dx, do
     *w = f->amplitude * omega * cos(phase) * (up - down) / bottom;
 }
 
-double silt_formula_surface(const silt_formula *formula, const double *x) {
-    const double d = formula->depth, k = sqrt(0.75 * formula->amplitude / (d * d * d));
-    return formula->amplitude / silt_square(cosh(k * (x[0] - formula->centre[0])));
+// profile of the solitary wave in units of the still depth, e = H/d, s2 = sech^2(k x): surface, k and c^2/(g d).
+// Boussinesq's: eta = e s2. Grimshaw's (1971, J. Fluid Mech. 46, 611) to third order.
+static double formula_profile(bool third, double e, double s2, double *k, double *speed) {
+    const double t2 = 1 - s2;
+    *k = sqrt(0.75 * e) * (third ? 1 - 5.0 / 8 * e + 71.0 / 128 * e * e : 1);
+    *speed = sqrt(1 + e - (third ? e * e / 20 + 3 * e * e * e / 70 : 0));
+    return e * s2 * (1 + (third ? -0.75 * e * t2 + e * e * t2 * (5.0 / 8 - 101.0 / 80 * s2) : 0));
 }
 
-// Solitary wave of Boussinesq's profile eta = H sech^2(k (x - xc)), k^2 = 3 H/(4 d^3), that moves with c^2 = g (d + H).
-// First order gives u = eta sqrt(g/d) over the whole depth, which is neither free of sources nor of rotation. Here the
-// velocity is that of the potential flow over a flat bed whose surface moves exactly so: u - i v = F(x + i y) with
-// F(z) = c sum_k a_k sech^(2k)(k z), which satisfies div u = rot u = 0 everywhere and v = 0 on the bed; the a_k are
-// such that the stream function is psi = c eta on the surface, i.e. d(eta)/dt = -c eta' there. Expanded in H/d, this is
-// Laitone's (1960) and Grimshaw's (1971) series for the profile given.
-enum { SOLITARY_TERMS = 6 };
-static void formula_solitary_wave(const silt_formula *f, double g, double dx, double dy, double *u, double *w) {
-    const double d = f->depth, k = sqrt(0.75 * f->amplitude / (d * d * d)), c = sqrt(g * (d + f->amplitude));
-    double a[SOLITARY_TERMS * (SOLITARY_TERMS + 1)], share[SOLITARY_TERMS];
-    // psi = c eta at as many places of the surface as there are terms, both sides divided by sech^2
-    for (int j = 0; j < SOLITARY_TERMS; j++) {
-        const double s2 = 0.5 * (1 - cos(M_PI * (2 * j + 1) / (2 * SOLITARY_TERMS)));
-        const double eta = f->amplitude * s2;
-        const double complex t = ctanh(acosh(1 / sqrt(s2)) + I * k * (d + eta));
-        for (int n = 0; n < SOLITARY_TERMS; n++) {
+double silt_formula_surface(const silt_formula *formula, const double *x) {
+    const double e = formula->amplitude / formula->depth;
+    double k, speed;
+    formula_profile(formula->profile == WAVE_GRIMSHAW, e, 1, &k, &speed);
+    const double s2 = 1 / silt_square(cosh(k * (x[0] - formula->centre[0]) / formula->depth));
+    return formula->depth * formula_profile(formula->profile == WAVE_GRIMSHAW, e, s2, &k, &speed);
+}
+
+// The velocity under a solitary wave. u = eta sqrt(g/d) over the whole depth, the first order, is neither free of
+// sources nor of rotation, and series in H/d (Laitone 1960, Grimshaw 1971) are so to their order only. Here u - i v =
+// F(x + i y) with F(z) = c sum_n a_n sech^(2n)(k z): div u = rot u = 0 everywhere and v = 0 on the flat bed, whatever
+// the a_n. They are those for which the stream function on the surface comes closest to c eta, i.e. the surface goes on
+// with the speed c and keeps its form: least squares of (psi/c - eta)/sech^2 over the surface.
+enum { WAVE_TERMS = sizeof((silt_formula *)0)->wave / sizeof(double), WAVE_PLACES = 60 };
+static void formula_wave_fit(const silt_formula *f, double *wave) {
+    const bool third = f->profile == WAVE_GRIMSHAW;
+    const double e = f->amplitude / f->depth;
+    double q[WAVE_TERMS][WAVE_PLACES], r[WAVE_TERMS][WAVE_TERMS] = {{0}}, b[WAVE_PLACES], k, speed;
+    for (int j = 0; j < WAVE_PLACES; j++) {
+        const double s2 = (j + 0.5) / WAVE_PLACES;
+        const double eta = formula_profile(third, e, s2, &k, &speed);
+        const double complex t = ctanh(acosh(1 / sqrt(s2)) + I * k * (1 + eta));
+        for (int n = 0; n < WAVE_TERMS; n++) {
             // integral of sech^(2n + 2): sum over m of binomial(n, m) (-1)^m t^(2m + 1)/(2m + 1)
             double complex sum = 0, power = t;
             double binomial = 1;
@@ -81,20 +92,53 @@ static void formula_solitary_wave(const silt_formula *f, double g, double dx, do
                 power *= t * t;
                 binomial *= -(double)(n - m) / (m + 1);
             }
-            a[j * (SOLITARY_TERMS + 1) + n] = cimag(sum) / (k * s2);
+            q[n][j] = cimag(sum) / (k * s2);
         }
-        a[j * (SOLITARY_TERMS + 1) + SOLITARY_TERMS] = f->amplitude;
+        b[j] = eta / s2;
     }
-    *u = *w = 0;
-    if (!formula_solve(SOLITARY_TERMS, a, share))
-        return;
-    const double complex t = ctanh(k * dx + I * k * dy), s2 = 1 - t * t;
+    // Gram and Schmidt, modified and done twice
+    for (int n = 0; n < WAVE_TERMS; n++) {
+        for (int twice = 0; twice < 2; twice++)
+            for (int m = 0; m < n; m++) {
+                double along = 0;
+                for (int j = 0; j < WAVE_PLACES; j++)
+                    along += q[m][j] * q[n][j];
+                for (int j = 0; j < WAVE_PLACES; j++)
+                    q[n][j] -= along * q[m][j];
+                r[m][n] += along;
+            }
+        double length = 0;
+        for (int j = 0; j < WAVE_PLACES; j++)
+            length += silt_square(q[n][j]);
+        r[n][n] = sqrt(length);
+        for (int j = 0; j < WAVE_PLACES; j++)
+            q[n][j] /= r[n][n];
+    }
+    for (int n = WAVE_TERMS - 1; n >= 0; n--) {
+        wave[n] = 0;
+        for (int j = 0; j < WAVE_PLACES; j++)
+            wave[n] += q[n][j] * b[j];
+        for (int m = n + 1; m < WAVE_TERMS; m++)
+            wave[n] -= r[n][m] * wave[m];
+        wave[n] /= r[n][n];
+    }
+}
+
+static void formula_solitary_wave(const silt_formula *f, double g, double dx, double dy, double *u, double *w) {
+    double fitted[WAVE_TERMS], k, speed;
+    const double *wave = f->wave;
+    if (wave[0] == 0) {
+        formula_wave_fit(f, fitted);
+        wave = fitted;
+    }
+    formula_profile(f->profile == WAVE_GRIMSHAW, f->amplitude / f->depth, 1, &k, &speed);
+    const double complex t = ctanh(k * (dx + I * dy) / f->depth), s2 = 1 - t * t;
     double complex flow = 0, power = s2;
-    for (int n = 0; n < SOLITARY_TERMS; n++, power *= s2)
-        flow += share[n] * power;
-    const double to = f->rate < 0 ? -c : c;
-    *u = to * creal(flow);
-    *w = -to * cimag(flow);
+    for (int n = 0; n < WAVE_TERMS; n++, power *= s2)
+        flow += wave[n] * power;
+    const double c = (f->rate < 0 ? -speed : speed) * sqrt(g * f->depth);
+    *u = c * creal(flow);
+    *w = -c * cimag(flow);
 }
 
 // fields -----------------------------------------------------------------------------------------------
@@ -206,7 +250,11 @@ static void field_search(const silt_field *field, const silt_series *series, int
     }
 }
 
-int silt_formula_index(silt_formula *formula) {
+int silt_formula_prepare(silt_formula *formula) {
+    if (formula->kind == FORMULA_SOLITARY_WAVE)
+        formula_wave_fit(formula, formula->wave);
+    if (formula->kind != FORMULA_FIELD)
+        return -1;
     const silt_series *series = &formula->series;
     const int n = series->n_row, dim = field_dim(formula);
     silt_field *field = silt_alloc(1, sizeof *field);
@@ -291,21 +339,36 @@ static bool field_cell_first(int dim, int n, const double (*q)[3], const double 
 }
 
 // The Delaunay triangulation is the lower hull of the points lifted onto a paraboloid, so the cell around the origin is
-// that with the smallest lift: corners are exchanged while that lowers it.
+// that with the smallest lift: the point farthest below the cell's plane becomes a corner until none lies below.
 static void field_cell_improve(int dim, int n, const double (*q)[3], const double *square, field_cell *cell) {
     for (int round = 0; round < 64; round++) {
-        field_cell best = *cell;
-        for (int p = 0; p < n; p++)
-            for (int c = 0; c <= dim; c++) {
-                field_cell other = *cell;
-                bool new = true;
-                for (int e = 0; e <= dim; e++)
-                    new = new &&other.corner[e] != p;
-                other.corner[c] = p;
-                if (new &&field_cell_make(dim, q, square, &other) && other.lift < best.lift - 1e-12 * square[n - 1])
-                    best = other;
+        double a[20], lifted[4], deepest = -1e-12;
+        int below = -1;
+        for (int r = 0; r <= dim; r++) {
+            a[r * (dim + 2)] = 1;
+            for (int k = 0; k < dim; k++)
+                a[r * (dim + 2) + k + 1] = q[cell->corner[r]][k];
+            a[r * (dim + 2) + dim + 1] = square[cell->corner[r]];
+        }
+        if (!formula_solve(dim + 1, a, lifted))
+            return;
+        for (int p = 0; p < n; p++) {
+            double above = square[p] - lifted[0];
+            for (int k = 0; k < dim; k++)
+                above -= lifted[k + 1] * q[p][k];
+            if (above < deepest) {
+                deepest = above;
+                below = p;
             }
-        if (best.lift == cell->lift)
+        }
+        field_cell best = *cell;
+        for (int c = 0; c <= dim && below >= 0; c++) {
+            field_cell other = *cell;
+            other.corner[c] = below;
+            if (field_cell_make(dim, q, square, &other) && other.lift < best.lift)
+                best = other;
+        }
+        if (!(best.lift < cell->lift))
             return;
         *cell = best;
     }
@@ -335,7 +398,8 @@ static bool field_plane(int dim, int n, const double (*q)[3], double *weight) {
 }
 
 // At a point of the table its values; between them linear on the cell of the Delaunay triangulation of the nearest
-// points; beside the cloud the plane through the nearest ones, farther than half their reach the nearest one's values.
+// points; beside the cloud the plane through the nearest ones, farther than 0.7 of their reach the nearest one's
+// values.
 static void formula_field(const silt_formula *f, const double *x, double *v) {
     const silt_series *series = &f->series;
     const int dim = field_dim(f);
@@ -363,7 +427,7 @@ static void formula_field(const silt_formula *f, const double *x, double *v) {
         field_cell_improve(dim, n, q, square, &cell);
         for (int c = 0; c <= dim; c++)
             weight[cell.corner[c]] = cell.weight[c];
-    } else if (square[0] > 0.25 || n <= dim || !field_plane(dim, n, q, weight)) {
+    } else if (square[0] > 0.49 || n <= dim || !field_plane(dim, n, q, weight)) {
         memset(weight, 0, sizeof weight);
         weight[0] = 1;
     }

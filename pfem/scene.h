@@ -83,11 +83,12 @@ typedef enum {
     FORMULA_STRAIN,         // rate: v = (-rate x, rate y) about centre
     FORMULA_TAYLOR_GREEN,   // amplitude, length, centre (the box's corner)
     FORMULA_STANDING_WAVE,  // amplitude (m, of the surface), wavelength (length), depth, centre: bed at the left antinode
-    FORMULA_SOLITARY_WAVE,  // amplitude (height H), depth, centre: bed below the crest; sign of rate: direction (0: +x)
+    FORMULA_SOLITARY_WAVE,  // amplitude (height H), depth, profile, centre: bed below the crest; sign of rate: direction (0: +x)
     FORMULA_FIELD,          // CSV of points x,y[,z],vx,vy[,vz]: linear on the Delaunay cell of points around, exact at a point
     FORMULA_CENTRAL,        // acceleration -rate |rate| (x - centre): to the centre, with a negative rate away from it
     FORMULA_SERIES,         // CSV over time, the same everywhere; after reading the columns are time, x, y, z
 } silt_formula_kind;
+typedef enum { WAVE_BOUSSINESQ = 0, WAVE_GRIMSHAW } silt_wave_profile; // eta = H sech^2(k x), or to third order in H/d
 typedef struct silt_field silt_field; // the points of FORMULA_FIELD by place (formula.c)
 /** A velocity at the start, or an acceleration (body force). In 3-D the plane of the 2-D formulas is x-z; a solid rotation
  * is right-handed about `axis`. */
@@ -97,6 +98,8 @@ typedef struct silt_formula {
     int axis;                    // 3-D: 1 to 3: x, y, z; 0: z for a rotation, for CENTRAL the distance from the point
     double vector[3], centre[3]; // vector: added to what the formula gives, to every kind but FORMULA_NONE
     double rate, amplitude, length, depth;
+    silt_wave_profile profile;
+    double wave[6];     // of the solitary wave's velocity, see formula.c; wave[0] = 0: not found yet
     silt_series series; // FIELD: columns x, y[, z], vx, vy[, vz] in this order after reading; SERIES
     silt_field *field;  // owned, FIELD: made while reading; NULL: the series is searched from end to end
 } silt_formula;
@@ -342,9 +345,10 @@ void silt_formula_velocity(const silt_formula *formula, double g, const double *
 void silt_formula_acceleration(const silt_formula *formula, double time, const double *x, double *a);
 /** height of the solitary wave's surface over still water at x[0], m */
 double silt_formula_surface(const silt_formula *formula, const double *x);
-/** Sorts the points of FORMULA_FIELD by place, so that a look-up takes O(log n).
- * @return -1, or the row of a point that stands there twice (no field is made then) */
-int silt_formula_index(silt_formula *formula);
+/** Does once what every look-up would do anew: sorts the points of FORMULA_FIELD by place, so that a look-up takes
+ * O(log n), finds the coefficients of FORMULA_SOLITARY_WAVE. Called while reading; without it both are only slower.
+ * @return -1, or the row of a point of the field that stands there twice (it is not sorted then) */
+int silt_formula_prepare(silt_formula *formula);
 void silt_formula_clear(silt_formula *formula); /**< frees series and field */
 
 /** Prints what the table of keys says: one line per key when key is NULL, a block's keys, or all about one key

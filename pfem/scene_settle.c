@@ -197,19 +197,21 @@ static void settle_formula(silt_reader *reader, const silt_scene *scene, silt_fo
     formula->dimension = dim;
     if (formula->kind == FORMULA_UNIFORM && !silt_tree_item(node, "vector"))
         silt_complain_key(reader, node, "key '%s.vector': found nothing in this block, allowed %s", path,
-                      dim == 3 ? "[x, y, z]" : "[x, y]");
-    if (formula->kind == FORMULA_SOLITARY_WAVE && formula->depth > 0 && silt_tree_item(node, "amplitude") &&
-        !(formula->amplitude > 0 && formula->amplitude <= 0.8 * formula->depth))
-        silt_complain(
-            reader, silt_tree_item(node, "amplitude"),
-            "key '%s.amplitude': found %.10g, allowed > 0 and <= 0.8 of the depth: no solitary wave is higher", path,
-            formula->amplitude);
+                          dim == 3 ? "[x, y, z]" : "[x, y]");
+    if (formula->kind == FORMULA_SOLITARY_WAVE && formula->depth > 0 && silt_tree_item(node, "amplitude")) {
+        if (formula->amplitude > 0 && formula->amplitude <= 0.4 * formula->depth)
+            silt_formula_prepare(formula);
+        else
+            silt_complain(reader, silt_tree_item(node, "amplitude"),
+                          "key '%s.amplitude': found %.10g, allowed > 0 and <= 0.4 of the depth", path,
+                          formula->amplitude);
+    }
     if (formula->kind == FORMULA_FIELD && table->n_row) {
         const char *const *name = point[dim == 3];
         if (settle_columns(reader, file, key, table, name, 2 * dim, 2 * dim, false) &&
             settle_finite(reader, file, key, table)) {
             settle_order(table, name, 2 * dim, false);
-            const int twice = silt_formula_index(formula);
+            const int twice = silt_formula_prepare(formula);
             if (twice >= 0)
                 silt_complain(reader, file, "key '%s': found a point again at %s:%d, allowed each point once", key,
                               table->path, table->line[twice]);
