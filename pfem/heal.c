@@ -50,7 +50,14 @@ typedef struct remedy {
     int fresh[HEAL_CELLS][4];
     double quality[HEAL_CELLS];
     double gain; // smallest quality after less before
+    double cost; // sum of 1/quality after less before: decides where the worst cell is the same
 } remedy;
+
+#define HEAL_TIE 1e-10 // qualities closer than this are the same: rounding must not decide
+
+static bool better(double value, double cost, double than, double than_cost) {
+    return value > than + HEAL_TIE || (value > than - HEAL_TIE && cost < than_cost - HEAL_TIE);
+}
 
 // cells and nodes around the edge a-b, starting at cell e; false: it lies on the boundary, or the ring is too long
 static bool ring_walk(const healer *s, int e, const int corner[4], int *ring, int *cell, int *n) {
@@ -86,40 +93,51 @@ static void try_edge(const healer *s, int e, const int corner[4], remedy *best) 
     patch p;
     patch_put(s, &p, 0, s->mesh->cell[e][corner[0]]);
     patch_put(s, &p, 1, s->mesh->cell[e][corner[1]]);
-    double before = HUGE_VAL;
+    double before = HUGE_VAL, cost_before = 0;
     for (int k = 0; k < n; k++) {
         patch_put(s, &p, 2 + k, ring[k]);
         before = silt_min(before, s->draft->quality[cell[k]]);
+        cost_before += 1 / silt_max(s->draft->quality[cell[k]], HEAL_TIE);
     }
-    const double bar = before + silt_max(best->gain, 0);
-    double worst[HEAL_RING][HEAL_RING], upper[HEAL_RING][HEAL_RING], lower[HEAL_RING][HEAL_RING];
+    const double bar = before + best->gain - HEAL_TIE;
+    double worst[HEAL_RING][HEAL_RING], cost[HEAL_RING][HEAL_RING], upper[HEAL_RING][HEAL_RING], lower[HEAL_RING][HEAL_RING];
     int split[HEAL_RING][HEAL_RING];
-    for (int i = 0; i + 1 < n; i++)
+    for (int i = 0; i + 1 < n; i++) {
         worst[i][i + 1] = HUGE_VAL;
+        cost[i][i + 1] = 0;
+    }
     for (int span = 2; span < n; span++)
         for (int i = 0; i + span < n; i++) {
             const int j = i + span;
             worst[i][j] = -1;
+            cost[i][j] = HUGE_VAL;
             for (int k = i + 1; k < j; k++) {
+                const double least = silt_max(worst[i][j] - HEAL_TIE, bar);
                 double value = silt_min(worst[i][k], worst[k][j]);
-                if (value <= silt_max(worst[i][j], bar))
+                if (value <= least)
                     continue;
                 const double over = patch_quality(&p, 2 + i, 2 + k, 2 + j, 1);
-                if (over <= silt_max(worst[i][j], bar))
+                if (over <= least)
                     continue;
                 const double under = patch_quality(&p, 2 + i, 2 + j, 2 + k, 0);
+                if (under <= least)
+                    continue;
                 value = silt_min(value, silt_min(over, under));
-                if (value > worst[i][j]) {
+                const double sum = cost[i][k] + cost[k][j] + 1 / over + 1 / under;
+                if (better(value, sum, worst[i][j], cost[i][j])) {
                     worst[i][j] = value;
+                    cost[i][j] = sum;
                     split[i][j] = k;
                     upper[i][j] = over;
                     lower[i][j] = under;
                 }
             }
         }
-    if (worst[0][n - 1] <= bar)
+    const double gain = worst[0][n - 1] - before, more = cost[0][n - 1] - cost_before;
+    if (gain <= HEAL_TIE || !better(gain, more, best->gain, best->cost))
         return;
-    best->gain = worst[0][n - 1] - before;
+    best->gain = gain;
+    best->cost = more;
     best->n_old = n;
     memcpy(best->old, cell, sizeof cell);
     best->n_new = 0;
@@ -155,14 +173,19 @@ static void try_facet(const healer *s, int e, int a, remedy *best) {
     patch_put(s, &p, 1, far);
     for (int k = 0; k < 3; k++)
         patch_put(s, &p, 2 + k, facet[k]);
-    const double before = silt_min(s->draft->quality[e], s->draft->quality[f]), bar = before + silt_max(best->gain, 0);
-    double quality[3];
+    const double q[2] = {s->draft->quality[e], s->draft->quality[f]}, before = silt_min(q[0], q[1]);
+    double quality[3], more = -1 / silt_max(q[0], HEAL_TIE) - 1 / silt_max(q[1], HEAL_TIE);
     for (int k = 0; k < 3; k++) {
         quality[k] = patch_quality(&p, 2 + k, 2 + (k + 1) % 3, 0, 1);
-        if (quality[k] <= bar)
+        if (quality[k] <= before + best->gain - HEAL_TIE)
             return;
+        more += 1 / quality[k];
     }
-    best->gain = silt_min(quality[0], silt_min(quality[1], quality[2])) - before;
+    const double gain = silt_min(quality[0], silt_min(quality[1], quality[2])) - before;
+    if (gain <= HEAL_TIE || !better(gain, more, best->gain, best->cost))
+        return;
+    best->gain = gain;
+    best->cost = more;
     best->n_old = 2;
     best->old[0] = e;
     best->old[1] = f;

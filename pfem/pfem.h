@@ -218,15 +218,17 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
                               silt_memory *memory, int *map, silt_error *err);
 
 /** Hands on momentum when a rebuild has changed the nodes' share of the water (momentum.c). With masses that count the debts,
- * m = rho (share of the cells + debt), sum m v stays to rounding, kinetic energy does not grow and no velocity leaves the
- * range of its group; prescribed velocities and the walls' normals are kept.
- * @param memory  of the rebuild just made, with record set
- * @param mass    kg, old numbering: what is moved are shares of these; NULL: from memory and debts (see docs/method.md)
+ * m = density (share of the cells + debt), sum m v stays to rounding, kinetic energy does not grow and no velocity leaves the
+ * range of its group and neighbours; prescribed velocities and the walls' normals are kept. Old numbering is the memory's, with
+ * the nodes that refinement added.
+ * @param memory  of the rebuild just made, with record set before it
+ * @param mesh    the new one
+ * @param mass    kg, old numbering: masses to use in place of m; NULL: m before the rebuild
  * @param debt    m3, old numbering, the nodes' debts before the rebuild
  * @param v       m/s, dim per node, old numbering, velocities before the rebuild
  * @param map     of the rebuild
- * @param lost    out, kg m/s, what could not be placed within the limits (walls that hold all nodes of a group) */
-void silt_momentum_hand_on(const silt_memory *memory, silt_nodes *nodes, const silt_walls *walls, double density,
+ * @param lost    out, kg m/s, what could not be placed within the limits (groups that walls hold) */
+void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, silt_nodes *nodes, double density,
                            const double *mass, const double *debt, const double *v, const int *map, double lost[3]);
 
 /** Finds points in the water. Rebuilt when mesh->revision or the positions changed (locate_build). */

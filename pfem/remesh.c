@@ -92,10 +92,103 @@ static int cell_count_free(const silt_nodes *nodes, int n_corner, const int *cel
     return n;
 }
 
+static bool were_joined(const silt_mesh *mesh, int i, int j) {
+    if (i >= mesh->n_node || j >= mesh->n_node)
+        return false;
+    for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++)
+        if (mesh->neighbour[k] == j)
+            return true;
+    return false;
+}
+
+// How wide a gap a tetrahedron spans: a flat one may lie across a wide gap, so what counts is how far those of its corners are
+// apart that no edge of the water joins. `mesh` still has the adjacency of the old cells, `rim` the old boundary's facets.
+static double gap_width(const silt_mesh *mesh, const silt_cell_set *rim, const int *cell, const double *corner,
+                        const silt_cell_shape *shape) {
+    int group[4] = {0, 1, 2, 3}, n_group = 4, size[4] = {0};
+    double length[4][4];
+    for (int a = 0; a < 4; a++)
+        for (int b = 0; b < a; b++) {
+            double square = 0;
+            for (int d = 0; d < 3; d++)
+                square += silt_square(corner[3 * a + d] - corner[3 * b + d]);
+            length[a][b] = length[b][a] = sqrt(square);
+            if (group[a] != group[b] && were_joined(mesh, cell[a], cell[b])) {
+                const int from = group[a], to = group[b];
+                for (int c = 0; c < 4; c++)
+                    group[c] = group[c] == from ? to : group[c];
+                n_group--;
+            }
+        }
+    for (int a = 0; a < 4; a++)
+        size[group[a]]++;
+    if (n_group == 1) {
+        // a fold or a pit of one surface: two of its facets at least are the surface
+        int n_rim = 0;
+        for (int a = 0; a < 4; a++) {
+            int facet[4];
+            silt_cell_facet(3, cell, a, facet);
+            facet[3] = -1;
+            n_rim += silt_cell_set_find(rim, facet) >= 0;
+        }
+        return n_rim >= 2 ? shape->height : HUGE_VAL;
+    }
+    for (int a = 0; a < 4 && n_group == 2; a++)
+        if (size[group[a]] == 1) { // a node before a facet
+            const double *p = corner + 3 * ((a + 1) % 4), *q = corner + 3 * ((a + 2) % 4), *r = corner + 3 * ((a + 3) % 4);
+            double square = 0;
+            for (int d = 0; d < 3; d++) {
+                const int m = (d + 1) % 3, n = (d + 2) % 3;
+                square += silt_square((q[m] - p[m]) * (r[n] - p[n]) - (q[n] - p[n]) * (r[m] - p[m]));
+            }
+            return 6 * shape->volume / sqrt(square);
+        }
+    if (n_group == 2) { // an edge before an edge, 0 and b before c and d
+        const int b = group[1] == group[0] ? 1 : group[2] == group[0] ? 2 : 3, c = b == 1 ? 2 : 1, d = 6 - b - c;
+        double u[3], v[3], w[3], n[3], uv = 0, nn = 0;
+        for (int k = 0; k < 3; k++) {
+            u[k] = (corner[3 * b + k] - corner[k]) / length[0][b];
+            v[k] = (corner[3 * d + k] - corner[3 * c + k]) / length[c][d];
+            w[k] = 0.5 * (corner[3 * c + k] + corner[3 * d + k] - corner[3 * b + k] - corner[k]);
+            uv += u[k] * v[k];
+        }
+        for (int k = 0; k < 3; k++) {
+            n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+            nn += n[k] * n[k];
+        }
+        double along = 0, wn = 0, ww = 0, mean = 0;
+        for (int k = 0; k < 3; k++) {
+            const double m = u[k] + (uv < 0 ? -v[k] : v[k]);
+            wn += w[k] * n[k];
+            ww += w[k] * w[k];
+            along += w[k] * m;
+            mean += m * m;
+        }
+        // crossing edges are as far apart as their lines, parallel ones as their middles across them
+        return nn > 0.1 ? fabs(wn) / sqrt(nn) : sqrt(silt_max(0, ww - along * along / mean));
+    }
+    // single nodes: the longest of the shortest links between them
+    double widest = 0;
+    bool reached[4] = {true, false, false, false};
+    for (int step = 0; step < 3; step++) {
+        int next = -1;
+        double shortest = HUGE_VAL;
+        for (int a = 0; a < 4; a++)
+            for (int b = 0; b < 4 && reached[a]; b++)
+                if (!reached[b] && (group[a] == group[b] ? 0 : length[a][b]) < shortest) {
+                    shortest = group[a] == group[b] ? 0 : length[a][b];
+                    next = b;
+                }
+        reached[next] = true;
+        widest = silt_max(widest, shortest);
+    }
+    return widest;
+}
+
 // a gap that is nearly shut and still closing joins; the water in it is no more than the gap was wide
-static bool cell_closes(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const double *corner,
-                        const silt_cell_shape *shape, double gap) {
-    if (shape->height >= gap)
+static bool cell_closes(const silt_mesh *mesh, const silt_nodes *nodes, const silt_cell_set *rim, const int *cell,
+                        const double *corner, const silt_cell_shape *shape, double gap) {
+    if (shape->height >= gap || (mesh->dim == 3 && gap_width(mesh, rim, cell, corner, shape) >= gap))
         return false;
     // dim! times the volume changes with the velocity of every node across the facet opposite it
     double rate = 0;
@@ -377,6 +470,14 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
         }
     silt_locator locator = {0};
     silt_locator_build(&locator, &gone, nodes->x, scene->fluid.size);
+    // the old surface, as cells without a fourth node
+    int (*facet)[4] = silt_alloc((size_t)mesh->n_facet + 1, sizeof *facet);
+    for (int k = 0; dim == 3 && k < mesh->n_facet; k++) {
+        memcpy(facet[k], mesh->facet[k], sizeof mesh->facet[k]);
+        facet[k][3] = -1;
+    }
+    silt_cell_set rim;
+    silt_cell_set_create(&rim, dim == 3 ? mesh->n_facet : 0, (const int(*)[4])facet);
 
     mesh->n_cell = 0;
     for (int e = 0; e < n_cells; e++) {
@@ -401,7 +502,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
             for (int a = 0; a <= dim; a++)
                 n_fluid += nodes->kind[cell[a]] == NODE_FLUID || nodes->kind[cell[a]] == NODE_INLET;
             keep = silt_locate(&locator, &gone, nodes->x, centre, weight) >= 0 ||
-                   (n_fluid > 0 && cell_closes(mesh, nodes, cell, corner, &shape, scene->fluid.merge * h));
+                   (n_fluid > 0 && cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
         }
         if (!keep || cell_behind(mesh, nodes, barrier, cell, centre))
             continue;
@@ -415,6 +516,8 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
     }
     silt_mesh_clear(&gone);
     silt_locator_clear(&locator);
+    free(rim.slot);
+    free(facet);
     free(stays);
     free(before);
     return largest;
