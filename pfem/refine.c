@@ -14,6 +14,9 @@ void silt_memory_clear(silt_memory *memory) {
     free(memory->taken_area);
     free(memory->interior);
     free(memory->dead);
+    free(memory->x);
+    free(memory->group_start);
+    free(memory->exchange);
     *memory = (silt_memory){0};
 }
 
@@ -34,8 +37,14 @@ void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nod
     memory->n_taken = 0;
     for (int e = 0; e < mesh->n_cell; e++) {
         memcpy(memory->cell[e], mesh->cell[e], sizeof memory->cell[e]);
-        memory->area[e] = silt_cell_area(nodes->x, mesh->cell[e]);
+        memory->area[e] = silt_cell_volume(mesh, nodes->x, e);
     }
+    const int dim = silt_nodes_dim(nodes);
+    memory->dim = dim;
+    memcpy(memory->period, mesh->period, sizeof memory->period);
+    memory->n_place = nodes->count;
+    SILT_RESERVE(memory->x, memory->place_capacity, dim * nodes->count + 1);
+    memcpy(memory->x, nodes->x, (size_t)(dim * nodes->count) * sizeof *memory->x);
     for (int i = 0; i < nodes->count; i++)
         memory->interior[i] = i < mesh->n_node && mesh->wet[i] && !mesh->surface[i];
 }
@@ -167,6 +176,8 @@ static void refine_stretched(refinement *r) {
 }
 
 void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h) {
+    if (silt_nodes_dim(nodes) == 3)
+        return; // the rules above are those of the plane
     refinement r = {.mesh = mesh, .nodes = nodes, .memory = memory, .h = h};
     r.locked = silt_alloc((size_t)mesh->n_node + 1, 1);
     for (int i = 0; i < mesh->n_node; i++)
