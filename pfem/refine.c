@@ -9,7 +9,9 @@
 #define REFINE_SHAPE 0.01   // less than this times h^dim comes or goes with the node
 #define REFINE_FLAT 0.25    // a node nearer to a wall than this times h is pressed out
 #define REFINE_LONG 1.5     // edges longer than this times h get nodes
-#define REFINE_ROOM 0.6     // but none nearer than this times h to another
+#define REFINE_ROOM 0.6     // but none nearer than this times h to another; on the boundary
+#define REFINE_RIM 0.36     // this: an edge of the surface that is not split tears, what is crowded by its node leaves
+#define HAND_VOLUME 0.05    // momentum is handed on where cells that changed kept their volume but for this share
 #define REFINE_PIECES 4     // into which an edge is split at most
 // cells smaller than this times h^dim are films: they break rather than fill with nodes
 static const double refine_film[4] = {0, 0, 0.25, 0.068};
@@ -401,7 +403,7 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
     if (n_wall)
         refine_onto(r, n_wall, wall, x);
     const double h = refine_h(r, a, b);
-    if (!refine_has_room(r, a, b, x, REFINE_ROOM * h))
+    if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : REFINE_RIM) * h))
         return;
     const int i = silt_nodes_add(nodes, NODE_FLUID, -1, x);
     for (int c = 0; c < dim; c++)
