@@ -39,7 +39,9 @@ typedef struct silt_nodes {
 
 static inline int silt_nodes_dim(const silt_nodes *nodes) { return nodes->dim == 3 ? 3 : 2; }
 /** wanted distance of node i to its neighbours; size: fluid.size */
-static inline double silt_node_h(const silt_nodes *nodes, int i, double size) { return nodes->h ? nodes->h[i] : size; }
+static inline double silt_node_h(const silt_nodes *nodes, int i, double size) {
+    return nodes->h && nodes->h[i] > 0 ? nodes->h[i] : size; // 0: added since the last silt_size_update
+}
 
 // ---------------------------------------------------------------- walls (wall.c)
 
@@ -86,6 +88,12 @@ bool silt_walls_share(const silt_walls *walls, int n, const int *const element[]
 /** Signed distance of a point to the nearest element, positive on the water's side; *element is that element (-1: no walls,
  * distance +inf). At a vertex the side is decided by the elements that meet there. */
 double silt_walls_distance(const silt_walls *walls, const double *point, int *element);
+/** Elements of different planes that a point touches: in 2-D up to two, in 3-D up to three (face, crease, corner).
+ * @param reach    m, what counts as touching
+ * @param element  out, the elements, -1 where there are fewer
+ * @param on       out, 2 (3) numbers, the point put exactly onto them; x itself when there is none
+ * @return how many */
+int silt_walls_touching(const silt_walls *walls, const double *x, double reach, int element[3], double on[3]);
 /** Nodes that lie on walls: puts them exactly on, lets them turn corners, attaches what has come through or touches. */
 void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double *x_old, const uint8_t *interior, double h);
 
@@ -96,10 +104,16 @@ void silt_nodes_clear(silt_nodes *nodes);
 int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double *x);
 /** Removes nodes with dead[i] != 0, keeps the order; map[i] is the new index or -1 */
 void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map);
-/** Fills the scene's regions with water nodes, inlets and tank corners; leaves out what lies in `solid` (bed, bodies). */
-typedef bool (*silt_solid_test)(const void *context, const double x[2], double margin);
+/** Fills the scene's regions with water nodes, inlets and tank corners; leaves out what lies in `solid` (bed, bodies). With
+ * fluid.sizes the spacing is the local one and nodes->h is written. */
+typedef bool (*silt_solid_test)(const void *context, const double *x, double margin);
 void silt_nodes_seed(silt_nodes *nodes, const silt_scene *scene, const silt_walls *walls, silt_solid_test solid,
                      const void *context);
+/** The same with the water's nodes from the file fluid.cloud: columns x, y[, z] and, if there, vx, vy[, vz], which then win over
+ * fluid.velocity. Nodes on walls are put onto them, those on inlets and tank corners are left out.
+ * Errors: SILT_INPUT, file and line of what is missing, not a number, behind a wall, in a solid, or there twice. */
+silt_status silt_nodes_read(silt_nodes *nodes, const silt_scene *scene, const silt_walls *walls, silt_solid_test solid,
+                            const void *context, silt_error *err);
 /** Points along a closed outline at spacing h, corners kept. @return how many; xy malloc'ed, owned by the caller */
 int silt_outline_points(int n, const double *outline, double h, double **xy);
 
@@ -108,12 +122,17 @@ int silt_outline_points(int n, const double *outline, double h, double **xy);
 typedef struct silt_size silt_size; // NULL: fluid.size everywhere
 /** Made from fluid.sizes; NULL without them. */
 void silt_size_create(silt_size **size, const silt_scene *scene, const silt_walls *walls);
-/** Follows what moves (surface, bed, bodies, walls) and writes nodes->h. */
+/** Follows what moves (surface, bed, bodies, wet walls) and writes nodes->h of every node; to be called after every rebuild. */
 struct silt_mesh;
 void silt_size_update(silt_size *size, silt_nodes *nodes, const struct silt_mesh *mesh);
+/** Points that stand for surface, bed or bodies until the first update, dim numbers each (the first cloud needs them). */
+void silt_size_near(silt_size *size, silt_near near, int n, const double *x);
 /** wanted distance between nodes at a point, m (at the last update); size NULL: fluid.size */
 double silt_size_at(const silt_size *size, const silt_scene *scene, const double *x);
 void silt_size_free(silt_size **size);
+/** signed distance from a region, m, negative inside; dim 3: polygons are upright prisms in x-z, circles are spheres */
+double silt_region_distance(const silt_region *region, int dim, const double *x);
+void silt_region_span(const silt_region *region, int dim, double lo[3], double hi[3]); /**< its bounds, m */
 
 // ---------------------------------------------------------------- mesh (mesh.c)
 
@@ -182,6 +201,8 @@ typedef struct silt_memory {
     int n_node, flag_capacity, dead_capacity;
     uint8_t *interior; // owned, one per node: had cells and no free facet
     uint8_t *dead;     // owned, one per node: leaves the cloud at the rebuild; NODE_LEFT: takes its water out of the domain
+    int momentum_capacity;
+    double *momentum;  // owned, dim + 1 per cell: its volume times mean velocity, m4/s, and volume, m3, when the cloud was edited
     double reconnected;     // m3, volume that the rebuild itself made (positive) or lost
     double left;            // m3, volume that went with the nodes that left
     int flat;               // 3-D: cells flatter than a fiftieth of h that could not be mended
@@ -199,8 +220,16 @@ void silt_memory_clear(silt_memory *memory);
 void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nodes *nodes);
 /** Makes the memory's flags as long as the cloud is now. */
 void silt_memory_extend(silt_memory *memory, int n_node);
-/** Marks crowded nodes dead and adds nodes where the mesh is stretched (refine.c). */
+/** Marks crowded nodes dead and adds nodes where the mesh is stretched, against the local size (refine.c). Nodes added on
+ * curved walls are put onto them (mesh->walls).
+ * @param h  fluid.size */
 void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h);
+/** After the rebuild: what cells that came and went together held as momentum, their nodes have again (refine.c).
+ * @param map  of the rebuild */
+void silt_nodes_hand_on(silt_nodes *nodes, const silt_mesh *mesh, const silt_memory *memory, const int *map);
+/** Shifts inner nodes by up to fluid.shuffle * h in each direction, their pressure and velocity with them along the mesh's
+ * gradients. The random numbers hang on fluid.seed, the step and the node's id. Before silt_memory_take. */
+void silt_nodes_shuffle(silt_nodes *nodes, const silt_mesh *mesh, const silt_scene *scene, int64_t step);
 
 /** what the water cannot enter */
 typedef struct silt_barrier {
