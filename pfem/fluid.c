@@ -29,6 +29,7 @@ void silt_fluid_clear(silt_fluid *fluid) {
     free(fluid->mobile);
     free(fluid->withheld);
     free(fluid->normal);
+    free(fluid->given);
     free(fluid->tau);
     for (int k = 0; k < 3; k++)
         free(fluid->cg[k]);
@@ -53,6 +54,7 @@ static void fluid_reserve(silt_fluid *f, int n_node, int n_cell) {
         ROOM(projection, 2, have_nodes, need);
         ROOM(projection_weight, 1, have_nodes, need);
         ROOM(normal, 2, have_nodes, need);
+        ROOM(given, 2, have_nodes, need);
         ROOM(mass, 1, have_nodes, need);
         ROOM(volume, 1, have_nodes, need);
         ROOM(inertia, 1, have_nodes, need);
@@ -86,10 +88,13 @@ static void hold_nodes(silt_fluid *f, const silt_scene *scene, const silt_walls 
     for (int i = 0; i < f->n_node; i++) {
         f->hold[i] = nodes->kind[i] == NODE_FLUID ? 0 : 2;
         f->normal[2 * i] = f->normal[2 * i + 1] = 0;
+        f->given[2 * i] = f->given[2 * i + 1] = 0;
         if (nodes->kind[i] == NODE_FLUID && nodes->wall[i][0] >= 0) {
-            const int s = nodes->wall[i][0], t = nodes->wall[i][1];
-            f->hold[i] = walls->slip[s] && t < 0 ? 1 : 2;
-            memcpy(f->normal + 2 * i, walls->normal[s], 2 * sizeof(double));
+            double vector[3];
+            f->hold[i] = silt_walls_hold(walls, nodes->wall[i], vector) == HOLD_NORMAL ? 1 : 2;
+            memcpy(f->normal + 2 * i, vector, 2 * sizeof(double));
+            silt_walls_given(walls, scene, nodes->wall[i], nodes->x + 2 * i, vector);
+            memcpy(f->given + 2 * i, vector, 2 * sizeof(double));
         }
     }
     if (!scene->bed.on || scene->bed.condition == WALL_NO_SLIP)
@@ -164,11 +169,11 @@ static void project(const silt_fluid *f, int i, double v[2]) {
     }
 }
 
-// the velocity that a held node has: bodies and inlets move, walls and the bed do not
-static void held_velocity(const silt_nodes *nodes, int i, double v[2]) {
-    const bool moves = nodes->kind[i] == NODE_BODY || nodes->kind[i] == NODE_INLET;
-    v[0] = moves ? nodes->v[2 * i] : 0;
-    v[1] = moves ? nodes->v[2 * i + 1] : 0;
+// the held part of a node's velocity: bodies, inlets and fixed nodes of walls have theirs, water on walls what those make of it
+static void held_velocity(const silt_fluid *f, const silt_nodes *nodes, int i, double v[2]) {
+    const bool moves = nodes->kind[i] == NODE_BODY || nodes->kind[i] == NODE_INLET || nodes->kind[i] == NODE_CORNER;
+    v[0] = moves ? nodes->v[2 * i] : f->given[2 * i];
+    v[1] = moves ? nodes->v[2 * i + 1] : f->given[2 * i + 1];
 }
 
 static bool cell_shape(const double *x, const int cell[3], double *area, double grad[3][2]) {
@@ -577,9 +582,9 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_scene *scene, const s
             for (int i = 0; i < f->n_node; i++) {
                 double v[2] = {f->force[2 * i] / f->inertia[i], f->force[2 * i + 1] / f->inertia[i]}, held[2];
                 project(f, i, v);
-                held_velocity(nodes, i, held);
+                held_velocity(f, nodes, i, held);
                 for (int d = 0; d < 2; d++)
-                    f->star[2 * i + d] = v[d] + (f->hold[i] == 2 ? held[d] : 0);
+                    f->star[2 * i + d] = v[d] + held[d];
             }
         }
         for (int i = 0; i < f->n_node; i++)
@@ -662,9 +667,9 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_scene *scene, const silt_w
     for (int i = 0; i < f->n_node; i++) {
         double v[2] = {nodes->v[2 * i], nodes->v[2 * i + 1]}, held[2];
         project(f, i, v);
-        held_velocity(nodes, i, held);
+        held_velocity(f, nodes, i, held);
         for (int d = 0; d < 2; d++)
-            f->w[2 * i + d] = !mesh->wet[i] ? 0 : v[d] + (f->hold[i] == 2 ? held[d] : 0);
+            f->w[2 * i + d] = !mesh->wet[i] ? 0 : v[d] + held[d];
     }
     wall_friction(f, scene, walls, nodes, mesh);
     for (int i = 0; i < f->n_node; i++) {
@@ -693,8 +698,11 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_scene *scene, const silt_w
             for (int d = 0; d < 2; d++)
                 nodes->v[2 * i + d] = f->hold[i] == 2 ? f->w[2 * i + d]
                                                       : nodes->v[2 * i + d] + (f->w[2 * i + d] - nodes->v[2 * i + d]) / scene->fluid.theta;
-            if (f->hold[i] == 1)
+            if (f->hold[i] == 1) {
                 project(f, i, nodes->v + 2 * i);
+                for (int d = 0; d < 2; d++)
+                    nodes->v[2 * i + d] += f->given[2 * i + d];
+            }
         }
     }
     free(p);

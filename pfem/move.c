@@ -16,8 +16,13 @@ void silt_run_prescribe(silt_run *run) {
             const struct silt_body *body = &bodies->body[nodes->owner[i]];
             v[0] = body->v[0] - body->w[2] * (nodes->x[2 * i + 1] - body->x[1]);
             v[1] = body->v[1] + body->w[2] * (nodes->x[2 * i] - body->x[0]);
-        } else if (nodes->kind[i] == NODE_CORNER)
-            v[0] = v[1] = 0;
+        } else if (nodes->kind[i] == NODE_CORNER) {
+            double wall[3] = {0};
+            if (nodes->owner[i] >= 0)
+                silt_walls_velocity(&run->walls, scene, nodes->owner[i], nodes->x + 2 * i, wall);
+            v[0] = wall[0];
+            v[1] = wall[1];
+        }
     }
 }
 
@@ -29,15 +34,25 @@ static void fly(silt_run *run, int i) {
     double a[2] = {g[0], g[1]};
     const int s = nodes->wall[i][0];
     if (s >= 0) {
+        double unused[3], own[3], given[3];
+        silt_walls_velocity(&run->walls, run->scene, s, x, own);
         const double *n = run->walls.normal[s], an = a[0] * n[0] + a[1] * n[1];
-        const bool held = an <= 0;
-        if (held && (nodes->wall[i][1] >= 0 || !run->walls.slip[s])) {
-            v[0] = v[1] = 0; // stuck, or in a corner
-            return;
-        }
+        // pressed on: left alone it would come nearer to the wall than the wall goes away from it
+        const double vn = v[0] * n[0] + v[1] * n[1], wn = own[0] * n[0] + own[1] * n[1];
+        const bool held = vn - wn + 0.5 * dt * an <= 0;
         if (held) {
-            a[0] -= an * n[0];
-            a[1] -= an * n[1];
+            silt_walls_given(&run->walls, run->scene, nodes->wall[i], x, given);
+            if (silt_walls_hold(&run->walls, nodes->wall[i], unused) != HOLD_NORMAL) {
+                for (int d = 0; d < 2; d++) { // stuck, or in a corner
+                    v[d] = given[d];
+                    x[d] += dt * v[d];
+                }
+                return;
+            }
+            for (int d = 0; d < 2; d++) {
+                a[d] -= an * n[d];
+                v[d] += given[d] - vn * n[d];
+            }
         } else
             nodes->wall[i][0] = nodes->wall[i][1] = -1;
     }
@@ -169,7 +184,9 @@ static void hand_on_landing(silt_run *run, const int *wall_before, const double 
         if (wall_before[i] >= 0 || s < 0 || run->walls.slip[s] || !mesh->wet[i])
             continue;
         const double *n = run->walls.normal[s], tangent[2] = {n[1], -n[0]};
-        const double momentum = run->fluid.mass[i] * (v_before[2 * i] * tangent[0] + v_before[2 * i + 1] * tangent[1]);
+        const double *now = nodes->v + 2 * i;
+        const double momentum =
+            run->fluid.mass[i] * ((v_before[2 * i] - now[0]) * tangent[0] + (v_before[2 * i + 1] - now[1]) * tangent[1]);
         double mass = 0;
         for (int pass = 0; pass < 2; pass++)
             for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++) {
