@@ -45,7 +45,7 @@ static inline double silt_node_h(const silt_nodes *nodes, int i, double size) { 
 
 /** where a moving wall of the scene stands and how it moves */
 typedef struct silt_wall_motion {
-    double shift[3], angle;   // m and rad, from the place in the scene; in 3-D the angle is about the y axis
+    double shift[3], angle;   // m and rad, from the place in the scene; the angle turns from x to y, in 3-D from x to z
     double velocity[3], spin; // m/s of the centre, rad/s
     double centre[3];         // m, what it turns about, at its present place
 } silt_wall_motion;

@@ -150,6 +150,8 @@ static const silt_key wall_rows[] = {
      .doc = "of the water at the wall"},
     {"roughness", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_wall, roughness),
      .doc = "equivalent sand roughness of the wall law; 0: smooth"},
+    {"motion", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_wall, motion),
+     .doc = "CSV file beside the scene: time in s, then any of x, y, z in m and angle in degrees from the place given here, columns by name"},
     {0}};
 TABLE(wall, "a wall", silt_wall, -1);
 

@@ -381,13 +381,13 @@ void silt_walls_clear(silt_walls *walls) {
 
 // ---------------------------------------------------------------- motion
 
-// a turn in the plane of the scene: about z in 2-D, about y in 3-D (right-handed: z towards x)
+// a turn in the plane of the scene: from x to y in 2-D, from x to z in 3-D
 static void turn(int dim, double cosine, double sine, const double v[3], double out[3]) {
-    const int a = dim == 3 ? 2 : 0, b = dim == 3 ? 0 : 1;
-    const double p = v[a], q = v[b];
+    const int up = dim == 3 ? 2 : 1;
+    const double p = v[0], q = v[up];
     memmove(out, v, 3 * sizeof *out);
-    out[a] = cosine * p - sine * q;
-    out[b] = sine * p + cosine * q;
+    out[0] = cosine * p - sine * q;
+    out[up] = sine * p + cosine * q;
 }
 
 static void series_place(const silt_series *motion, double time, double shift[3], double *angle) {

@@ -339,7 +339,10 @@ static double box_distance2(const wall_box *box, const double x[3]) {
 static void hit_element(const silt_walls *walls, int e, const double x[3], wall_hit *hit) {
     double on[3], n[3], to[3];
     int feature;
-    const double distance = sqrt(wall_nearest(walls, e, x, on, &feature));
+    const double square = wall_nearest(walls, e, x, on, &feature);
+    if (square > silt_square(hit->distance * (1 + 1e-11) + 1e-11))
+        return;
+    const double distance = sqrt(square);
     const bool tie = fabs(distance - hit->distance) <= 1e-12 * (1 + distance);
     if (!tie && distance > hit->distance)
         return;
@@ -355,22 +358,30 @@ static void hit_element(const silt_walls *walls, int e, const double x[3], wall_
 
 static void hit_tree(const silt_walls *walls, int tree, const double x[3], wall_hit *hit) {
     const struct silt_wall_index *index = walls->index;
-    int stack[STACK_DEPTH], depth = 0;
-    stack[depth++] = index->tree[tree].root;
+    struct {
+        int box;
+        double square;
+    } stack[STACK_DEPTH];
+    int depth = 0;
+    stack[depth].box = index->tree[tree].root;
+    stack[depth++].square = box_distance2(&index->box[index->tree[tree].root], x);
     while (depth) {
-        const wall_box *box = &index->box[stack[--depth]];
-        const double reach = hit->distance + 1e-12 * (1 + hit->distance);
-        if (box_distance2(box, x) > reach * reach)
+        depth--;
+        if (stack[depth].square > silt_square(hit->distance + 1e-12 * (1 + hit->distance)))
             continue;
+        const wall_box *box = &index->box[stack[depth].box];
         if (box->count) {
             for (int k = 0; k < box->count; k++)
                 hit_element(walls, index->item[box->first + k], x, hit);
             continue;
         }
         // the nearer child first
-        const int far_one = box_distance2(&index->box[box->first], x) <= box_distance2(&index->box[box->first + 1], x);
-        stack[depth++] = box->first + far_one;
-        stack[depth++] = box->first + 1 - far_one;
+        const double square[2] = {box_distance2(&index->box[box->first], x), box_distance2(&index->box[box->first + 1], x)};
+        const int far_one = square[0] <= square[1], first = box->first;
+        stack[depth].box = first + far_one;
+        stack[depth++].square = square[far_one];
+        stack[depth].box = first + 1 - far_one;
+        stack[depth++].square = square[1 - far_one];
     }
 }
 
