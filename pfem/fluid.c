@@ -30,6 +30,7 @@ void silt_fluid_clear(silt_fluid *fluid) {
     free(fluid->withheld);
     free(fluid->normal);
     free(fluid->given);
+    silt_wall_normals_clear(&fluid->wall_normals);
     free(fluid->tau);
     for (int k = 0; k < 3; k++)
         free(fluid->cg[k]);
@@ -85,16 +86,16 @@ static void fluid_reserve(silt_fluid *f, int n_node, int n_cell) {
 // which velocity components the surroundings hold
 static void hold_nodes(silt_fluid *f, const silt_scene *scene, const silt_walls *walls, const silt_nodes *nodes,
                        const silt_mesh *mesh) {
+    silt_wall_normals_take(&f->wall_normals, walls, nodes, mesh);
     for (int i = 0; i < f->n_node; i++) {
         f->hold[i] = nodes->kind[i] == NODE_FLUID ? 0 : 2;
         f->normal[2 * i] = f->normal[2 * i + 1] = 0;
         f->given[2 * i] = f->given[2 * i + 1] = 0;
         if (nodes->kind[i] == NODE_FLUID && nodes->wall[i][0] >= 0) {
-            double vector[3];
-            f->hold[i] = silt_walls_hold(walls, nodes->wall[i], vector) == HOLD_NORMAL ? 1 : 2;
+            double vector[3], given[3];
+            f->hold[i] = silt_walls_held(walls, scene, &f->wall_normals, nodes, i, vector, given) == HOLD_NORMAL ? 1 : 2;
             memcpy(f->normal + 2 * i, vector, 2 * sizeof(double));
-            silt_walls_given(walls, scene, nodes->wall[i], nodes->x + 2 * i, vector);
-            memcpy(f->given + 2 * i, vector, 2 * sizeof(double));
+            memcpy(f->given + 2 * i, given, 2 * sizeof(double));
         }
     }
     if (!scene->bed.on || scene->bed.condition == WALL_NO_SLIP)
@@ -698,7 +699,9 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_scene *scene, const silt_w
             for (int d = 0; d < 2; d++)
                 nodes->v[2 * i + d] = f->hold[i] == 2 ? f->w[2 * i + d]
                                                       : nodes->v[2 * i + d] + (f->w[2 * i + d] - nodes->v[2 * i + d]) / scene->fluid.theta;
-            if (f->hold[i] == 1) {
+            // on a bent wall the velocity turns on: contact takes it along the wall
+            const bool bent = f->wall_normals.n_row && f->wall_normals.row[i] >= 0;
+            if (f->hold[i] == 1 && !bent) {
                 project(f, i, nodes->v + 2 * i);
                 for (int d = 0; d < 2; d++)
                     nodes->v[2 * i + d] += f->given[2 * i + d];

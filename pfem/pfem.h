@@ -89,6 +89,19 @@ void silt_walls_velocity(const silt_walls *walls, const silt_scene *scene, int e
 /** The held part of the velocity of a node at x (start of the step): along the normal (HOLD_NORMAL), across the line (HOLD_LINE),
  * all of it (HOLD_ALL), 0 (HOLD_FREE). A node that moves with it and any free part lands on the walls where they are now. */
 void silt_walls_given(const silt_walls *walls, const silt_scene *scene, const int element[3], const double *x, double v[3]);
+/** Normals at nodes on patches that bend: those of the water's own facets on the patch around the node, weighted with their size.
+ * With the elements' normals water would pass between nodes on two sides of a bend (Engelman, Sani and Gresho 1982). */
+typedef struct silt_wall_normals {
+    int n_row, row_capacity, normal_capacity;
+    int *row;               // owned, one per node: its row of normals, -1: the elements' normals; NULL without bent patches
+    double (*normal)[3][3]; // owned, one for each of the node's elements, unit
+} silt_wall_normals;
+struct silt_mesh;
+void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls, const silt_nodes *nodes, const struct silt_mesh *mesh);
+void silt_wall_normals_clear(silt_wall_normals *normals);
+/** silt_walls_hold and silt_walls_given in one, with those normals. @param normals  NULL: the elements' */
+silt_hold silt_walls_held(const silt_walls *walls, const silt_scene *scene, const silt_wall_normals *normals, const silt_nodes *nodes,
+                          int i, double vector[3], double given[3]);
 /** true when the nodes share a patch: a facet between them lies on the wall */
 bool silt_walls_share(const silt_walls *walls, int n, const int *const element[]);
 /** Signed distance of a point to the nearest element, positive on the water's side; *element is that element (-1: no walls,

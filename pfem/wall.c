@@ -233,6 +233,8 @@ static void elements_join(silt_walls *walls) {
 static void elements_group(silt_walls *walls) {
     const int n = walls->count, dim = wall_dim(walls);
     int *piece = walls->index->piece = silt_alloc((size_t)n + 1, sizeof *piece);
+    uint8_t *bends = silt_alloc((size_t)n + 1, 1);
+    walls->index->bent = silt_alloc((size_t)n + 1, 1);
     for (int e = 0; e < n; e++)
         walls->patch[e] = piece[e] = e;
     for (int e = 0; e < n; e++)
@@ -241,8 +243,11 @@ static void elements_group(silt_walls *walls) {
             if (f < 0)
                 continue;
             silt_group_join(piece, both);
-            if (wall_dot(walls->normal[e], walls->normal[f]) > WALL_BEND)
+            const double bend = wall_dot(walls->normal[e], walls->normal[f]);
+            if (bend > WALL_BEND) {
                 silt_group_join(walls->patch, both);
+                bends[e] |= bend < 1 - 1e-9;
+            }
         }
     uint8_t *obstacle = silt_alloc((size_t)n + 1, 1);
     double *volume = silt_alloc((size_t)n + 1, sizeof *volume);
@@ -250,7 +255,12 @@ static void elements_group(silt_walls *walls) {
         piece[e] = silt_group_find(piece, e);
         walls->patch[e] = silt_group_find(walls->patch, e);
         obstacle[e] = 1;
+        walls->index->bent[walls->patch[e]] |= bends[e];
+        walls->index->any_bent |= bends[e];
     }
+    for (int e = 0; e < n; e++)
+        walls->index->bent[e] = walls->index->bent[walls->patch[e]];
+    free(bends);
     for (int e = 0; e < n; e++) {
         // twice the area or six times the volume that lies behind, from the piece's first corner
         double room[4][3], r[3][3], c[3];
@@ -368,6 +378,7 @@ void silt_walls_clear(silt_walls *walls) {
         free(index->item);
         free(index->vertex);
         free(index->piece);
+        free(index->bent);
         free(index->vertex_normal);
         free(index->place);
         free(index->place_normal);
@@ -512,15 +523,7 @@ void silt_walls_velocity(const silt_walls *walls, const silt_scene *scene, int e
 
 // ---------------------------------------------------------------- what walls hold
 
-static int elements_count(const int element[3], int dim) {
-    int n = 0;
-    while (n < dim && element[n] >= 0)
-        n++;
-    return n;
-}
-
-silt_hold silt_walls_hold(const silt_walls *walls, const int element[3], double vector[3]) {
-    const int n = elements_count(element, wall_dim(walls));
+static silt_hold hold_by(const silt_walls *walls, int n, const int element[3], const double *const normal[3], double vector[3]) {
     memset(vector, 0, 3 * sizeof *vector);
     for (int k = 0; k < n; k++)
         if (!walls->slip[element[k]])
@@ -530,23 +533,36 @@ silt_hold silt_walls_hold(const silt_walls *walls, const int element[3], double 
     if (n == wall_dim(walls))
         return HOLD_ALL;
     if (n == 2) {
-        wall_cross(walls->normal[element[0]], walls->normal[element[1]], vector);
+        wall_cross(normal[0], normal[1], vector);
         const double length = sqrt(wall_dot(vector, vector));
         for (int d = 0; d < 3 && length > 0; d++)
             vector[d] /= length;
         if (length > 1e-3)
             return HOLD_LINE;
     }
-    memcpy(vector, walls->normal[element[0]], 3 * sizeof *vector);
+    memcpy(vector, normal[0], 3 * sizeof *vector);
     return HOLD_NORMAL;
 }
 
-bool wall_given(const silt_walls *walls, int n, const int element[3], const double own[3][3], double out[3]) {
+// how many elements, and their normals
+static int elements_normals(const silt_walls *walls, const int element[3], const double *normal[3]) {
+    int n = 0;
+    for (; n < wall_dim(walls) && element[n] >= 0; n++)
+        normal[n] = walls->normal[element[n]];
+    return n;
+}
+
+silt_hold silt_walls_hold(const silt_walls *walls, const int element[3], double vector[3]) {
     const double *normal[3] = {NULL};
+    const int n = elements_normals(walls, element, normal);
+    return hold_by(walls, n, element, normal, vector);
+}
+
+bool wall_given(const silt_walls *walls, int n, const int element[3], const double *const normal[3], const double own[3][3],
+                double out[3]) {
     double value[3] = {0}, along[3] = {0};
     int stuck = 0;
     for (int k = 0; k < n; k++) {
-        normal[k] = walls->normal[element[k]];
         value[k] = wall_dot(normal[k], own[k]);
         if (walls->slip[element[k]])
             continue;
@@ -573,15 +589,112 @@ bool wall_given(const silt_walls *walls, int n, const int element[3], const doub
     return stuck || used == wall_dim(walls);
 }
 
-void silt_walls_given(const silt_walls *walls, const silt_scene *scene, const int element[3], const double *x, double v[3]) {
-    const int n = elements_count(element, wall_dim(walls));
+static void given_by(const silt_walls *walls, const silt_scene *scene, int n, const int element[3], const double *const normal[3],
+                     const double *x, double v[3]) {
     double own[3][3];
+    memset(v, 0, 3 * sizeof *v);
     for (int k = 0; k < n; k++)
         silt_walls_velocity(walls, scene, element[k], x, own[k]);
-    if (n == 0)
-        memset(v, 0, 3 * sizeof *v);
-    else
-        wall_given(walls, n, element, (const double(*)[3])own, v);
+    if (n)
+        wall_given(walls, n, element, normal, (const double(*)[3])own, v);
+}
+
+void silt_walls_given(const silt_walls *walls, const silt_scene *scene, const int element[3], const double *x, double v[3]) {
+    const double *normal[3] = {NULL};
+    const int n = elements_normals(walls, element, normal);
+    given_by(walls, scene, n, element, normal, x, v);
+}
+
+// ---------------------------------------------------------------- normals on bent patches
+
+void silt_wall_normals_clear(silt_wall_normals *normals) {
+    free(normals->row);
+    free(normals->normal);
+    *normals = (silt_wall_normals){0};
+}
+
+// the patch that all nodes of a wall's facet share, but for those that know no walls (fixed ones); -1
+static int facet_patch(const silt_walls *walls, const silt_nodes *nodes, int n, const int *facet) {
+    const int *first = NULL;
+    for (int c = 0; c < n && !first; c++)
+        first = nodes->wall[facet[c]][0] >= 0 ? nodes->wall[facet[c]] : NULL;
+    for (int s = 0; first && s < 3 && first[s] >= 0; s++) {
+        bool all = true;
+        for (int c = 0; c < n && all; c++) {
+            const int *other = nodes->wall[facet[c]];
+            all = other[0] < 0;
+            for (int t = 0; t < 3 && !all; t++)
+                all = other[t] >= 0 && walls->patch[other[t]] == walls->patch[first[s]];
+        }
+        if (all)
+            return walls->patch[first[s]];
+    }
+    return -1;
+}
+
+void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls, const silt_nodes *nodes, const silt_mesh *mesh) {
+    normals->n_row = 0;
+    if (!walls->count || !walls->index->any_bent)
+        return;
+    const int dim = wall_dim(walls);
+    SILT_RESERVE(normals->row, normals->row_capacity, nodes->count + 1);
+    for (int i = 0; i < nodes->count; i++)
+        normals->row[i] = -1;
+    for (int k = 0; k < mesh->n_facet; k++) {
+        const int *facet = mesh->facet[k];
+        const int patch = mesh->facet_kind[k] == FACET_WALL ? facet_patch(walls, nodes, dim, facet) : -1;
+        if (patch < 0 || !walls->index->bent[patch])
+            continue;
+        // the facet's size and direction, into the water
+        double side[2][3] = {{0}}, area[3];
+        for (int c = 1; c < dim; c++)
+            for (int d = 0; d < dim; d++) {
+                side[c - 1][d] = nodes->x[dim * facet[c] + d] - nodes->x[dim * facet[0] + d];
+                if (mesh->period[d] > 0)
+                    side[c - 1][d] -= mesh->period[d] * floor(side[c - 1][d] / mesh->period[d] + 0.5);
+            }
+        if (dim == 3)
+            wall_cross(side[1], side[0], area);
+        else {
+            area[0] = -side[0][1];
+            area[1] = side[0][0];
+            area[2] = 0;
+        }
+        for (int c = 0; c < dim; c++) {
+            const int i = facet[c];
+            for (int s = 0; s < dim && nodes->wall[i][s] >= 0; s++) {
+                if (walls->patch[nodes->wall[i][s]] != patch)
+                    continue;
+                if (normals->row[i] < 0) {
+                    SILT_RESERVE(normals->normal, normals->normal_capacity, normals->n_row + 1);
+                    normals->row[i] = normals->n_row++;
+                    memset(normals->normal[normals->row[i]], 0, sizeof *normals->normal);
+                }
+                for (int d = 0; d < 3; d++)
+                    normals->normal[normals->row[i]][s][d] += area[d];
+            }
+        }
+    }
+    for (int i = 0; i < nodes->count; i++)
+        for (int s = 0; s < dim && normals->row[i] >= 0 && nodes->wall[i][s] >= 0; s++) {
+            double *n = normals->normal[normals->row[i]][s];
+            const double *own = walls->normal[nodes->wall[i][s]], length = sqrt(wall_dot(n, n));
+            // facets that say something else than the wall are not believed
+            const bool sound = length > 0 && wall_dot(n, own) > 0.8 * length;
+            for (int d = 0; d < 3; d++)
+                n[d] = sound ? n[d] / length : own[d];
+        }
+}
+
+silt_hold silt_walls_held(const silt_walls *walls, const silt_scene *scene, const silt_wall_normals *normals, const silt_nodes *nodes,
+                          int i, double vector[3], double given[3]) {
+    const double *normal[3] = {NULL};
+    const int n = elements_normals(walls, nodes->wall[i], normal);
+    if (normals && normals->n_row && normals->row[i] >= 0)
+        for (int k = 0; k < n; k++)
+            normal[k] = normals->normal[normals->row[i]][k];
+    given_by(walls, scene, n, nodes->wall[i], normal, nodes->x + wall_dim(walls) * i, given);
+    return hold_by(walls, n, nodes->wall[i], normal, vector);
 }
 
 bool silt_walls_share(const silt_walls *walls, int n, const int *const element[]) {

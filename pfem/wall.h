@@ -41,6 +41,8 @@ struct silt_wall_index {
     int n_vertex;
     int (*vertex)[3];              // owned, welded corners of the elements
     int *piece;                    // owned, one per element: joined elements share a number
+    uint8_t *bent;                 // owned, one per element: its patch is not plane
+    bool any_bent;
     double (*vertex_normal)[3];    // owned, 3-D: normals summed by angle (Baerentzen and Aanaes 2005)
     double (*place)[3][3];         // owned, corners at the scene's place, NULL: nothing moves
     double (*place_normal)[3];     // owned, one per element
@@ -82,7 +84,8 @@ void wall_carry_back(const silt_walls *walls, int wall, const double x[3], doubl
 void wall_sliding(const silt_walls *walls, int e, double v[3]);
 /** What held elements ask of a vector when each of them asks own[k]: normal components of all; along what they leave free the
  * mean of those without slip. @return true when nothing is left free */
-bool wall_given(const silt_walls *walls, int n, const int element[3], const double own[3][3], double out[3]);
+bool wall_given(const silt_walls *walls, int n, const int element[3], const double *const normal[3], const double own[3][3],
+                double out[3]);
 
 // surface.c -------------------------------------------------------------------------------------------
 /** a triangulated surface */

@@ -111,7 +111,7 @@ static void node_mend_velocity(const silt_walls *walls, contact_node *p) {
     if (!p->n)
         return;
     if (!slip)
-        wall_given(walls, p->n, p->e, (const double(*)[3])own, p->v);
+        wall_given(walls, p->n, p->e, normal, (const double(*)[3])own, p->v);
     else if (wall_solve(p->n, normal, value, out))
         for (int d = 0; d < 3; d++)
             p->v[d] -= out[d];
@@ -137,11 +137,24 @@ static void node_bend(const silt_walls *walls, contact_node *p, int e, int edge,
         speed[d] = p->v[d] - wall[d];
     }
     const double way_along = wall_dot(way, along), way_out = wall_dot(way, out);
-    const double speed_along = wall_dot(speed, along), speed_out = wall_dot(speed, out);
+    const double speed_along = wall_dot(speed, along), speed_out = wall_dot(speed, out), speed_off = wall_dot(speed, walls->normal[e]);
     for (int d = 0; d < 3; d++) {
         p->x[d] = at[d] + way_along * along[d] + way_out * into[d];
-        p->v[d] = wall[d] + speed_along * along[d] + speed_out * into[d];
+        p->v[d] = wall[d] + speed_along * along[d] + speed_out * into[d] + speed_off * walls->normal[f][d];
     }
+}
+
+// On a bent patch the velocity turns with the wall and keeps its size: no work is done by turning.
+static void node_turn(const silt_walls *walls, contact_node *p) {
+    const double *n = walls->normal[p->e[0]];
+    double wall[3], speed[3];
+    material_velocity(walls, walls->wall[p->e[0]], p->x, wall);
+    for (int d = 0; d < 3; d++)
+        speed[d] = p->v[d] - wall[d];
+    const double off = wall_dot(speed, n), whole = wall_dot(speed, speed), along = whole - off * off;
+    const double factor = along > 0.5 * whole ? sqrt(whole / along) : 1;
+    for (int d = 0; d < 3; d++)
+        p->v[d] = wall[d] + factor * (speed[d] - off * n[d]);
 }
 
 // an element that goes on where e ends without being joined to it, -1
@@ -321,7 +334,9 @@ static void node_contact(contact *c, contact_node *p, bool interior) {
     if (p->n) {
         bool stuck = false;
         double own[3][3], way[3];
+        const double *normal[3] = {NULL};
         for (int k = 0; k < p->n; k++) {
+            normal[k] = walls->normal[p->e[k]];
             stuck |= !walls->slip[p->e[k]];
             wall_carry(walls, walls->wall[p->e[k]], p->old, own[k]);
             memcpy(q, own[0], sizeof q);
@@ -330,7 +345,7 @@ static void node_contact(contact *c, contact_node *p, bool interior) {
         }
         // without slip a node stays where it is on the wall, whatever the surface does along itself
         if (stuck) {
-            wall_given(walls, p->n, p->e, (const double(*)[3])own, way);
+            wall_given(walls, p->n, p->e, normal, (const double(*)[3])own, way);
             for (int d = 0; d < 3; d++)
                 p->x[d] = p->old[d] + way[d];
         }
@@ -338,6 +353,8 @@ static void node_contact(contact *c, contact_node *p, bool interior) {
         for (int d = 0; d < 3; d++)
             q[d] -= off * walls->normal[p->e[0]][d];
         node_slide(c, p, q);
+        if (!stuck && !p->changed && p->n == 1 && walls->index->bent[p->e[0]])
+            node_turn(walls, p);
     }
     // other walls in its way: one more holds it
     for (int turn = 0; turn < c->dim; turn++) {
