@@ -40,7 +40,7 @@ static const struct argp_option main_options[] = {
     {"force", LONG_ONLY(OPTION_FORCE), NULL, 0, "replace an output folder that is there", 0},
     {"worker", LONG_ONLY('w'), "PATH", OPTION_HIDDEN, "the silt-dem program", 0},
     {"frame", LONG_ONLY(OPTION_FRAME), "N|all", 0, "the frame to draw; default: the last", 0},
-    {"field", LONG_ONLY(OPTION_FIELD), "NAME", 0, "speed (default), pressure, porosity, mesh or bed", 0},
+    {"field", LONG_ONLY(OPTION_FIELD), "NAME", 0, "speed (default), pressure, elevation, porosity, mesh or bed", 0},
     {"to", LONG_ONLY('d'), "FOLDER", 0, "where the pictures go; default: OUT", 0},
 };
 enum { N_OPTION = sizeof main_options / sizeof main_options[0] };
