@@ -201,12 +201,12 @@ static bool space_sharp(const silt_walls *walls, int element, int edge) {
 
 // faces that the water's side turns to the eye; edges of all, those of faces seen from behind thin
 static void space_walls(space *s, const silt_walls *walls) {
-    const silt_draw_colour grey = silt_draw_hex(0xd9dadb), dark = silt_draw_hex(0x54585c), pale = silt_draw_hex(0xa9adb1);
+    const silt_draw_colour grey = silt_draw_hex(0xe4e6e8), dark = silt_draw_hex(0x54585c), pale = silt_draw_hex(0xa9adb1);
     const double lift = space_lift(s);
     for (int i = 0; i < walls->count; i++) {
         const double facing = space_dot(walls->normal[i], s->eye);
         if (facing > 0) {
-            space_face face = {.flat = grey, .plain = 0.72, .lit = 0.33};
+            space_face face = {.flat = grey, .plain = 0.8, .lit = 0.24};
             for (int k = 0; k < 3; k++) {
                 face.x[k] = walls->corner[i][k];
                 memcpy(face.normal[k], walls->normal[i], sizeof face.normal[k]);
@@ -237,7 +237,7 @@ static void space_water(space *s, int number) {
                 const int *node = grid.link + grid.offset[i];
                 const bool open = !grid.kind || grid.kind[i] == FACET_FREE;
                 double normal[3];
-                space_face face = {.flat = plain, .plain = 0.62, .lit = 0.4, .gloss = open ? 0.22 : 0};
+                space_face face = {.flat = plain, .plain = 0.68, .lit = 0.36, .gloss = open ? 0.22 : 0};
                 for (int k = 0; k < 3; k++)
                     face.x[k] = grid.x + 3 * node[k];
                 space_normal(face.x[0], face.x[1], face.x[2], normal);
