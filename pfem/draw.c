@@ -10,15 +10,18 @@ static const unsigned draw_map[] = {0x440154, 0x482878, 0x3e4989, 0x31688e, 0x26
                                     0x1f9e89, 0x35b779, 0x6ece58, 0xb5de2b, 0xfde725};
 // untouched sand to worn
 static const unsigned draw_worn[] = {0xf3e6c4, 0xf8cf87, 0xf0a050, 0xd96a2c, 0xa63c1e, 0x641a12};
+// left-handed blue, right-handed red
+static const unsigned draw_turn[] = {0x16345f, 0x2f6da8, 0x86b7d8, 0xf4f4f2, 0xe9a285, 0xbe4440, 0x5f1227};
 #define DRAW_MAP(table) table, sizeof(table) / sizeof *(table)
 
 static const silt_draw_field draw_fields[] = {
-    {"speed", "speed, m/s", "PointData/velocity", NULL, false, DRAW_MAP(draw_map)},
-    {"pressure", "pressure, Pa", "PointData/pressure", NULL, false, DRAW_MAP(draw_map)},
-    {"porosity", "porosity", "PointData/porosity", NULL, false, DRAW_MAP(draw_map)},
-    {"elevation", "elevation, m", "none", NULL, true, DRAW_MAP(draw_map)},
-    {"mesh", NULL, NULL, NULL, false, DRAW_MAP(draw_map)},
-    {"bed", "frictional work, J/m³", NULL, "PointData/work", false, DRAW_MAP(draw_worn)},
+    {"speed", "speed, m/s", "PointData/velocity", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
+    {"pressure", "pressure, Pa", "PointData/pressure", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
+    {"porosity", "porosity", "PointData/porosity", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
+    {"elevation", "elevation, m", "PointData/pressure", NULL, MADE_ELEVATION, DRAW_MAP(draw_map)},
+    {"vorticity", "vorticity, 1/s", "PointData/velocity", NULL, MADE_VORTICITY, DRAW_MAP(draw_turn)},
+    {"mesh", NULL, NULL, NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
+    {"bed", "frictional work, J/m³", NULL, "PointData/work", MADE_LENGTH, DRAW_MAP(draw_worn)},
 };
 
 // ---------------------------------------------------------------- a picture
@@ -33,7 +36,7 @@ static silt_status draw_picture(silt_draw_canvas *c, const silt_frame_entry *ent
     cairo_set_source_rgb(c->cr, 1, 1, 1);
     cairo_paint(c->cr);
 
-    if (c->scene->dimension == 3)
+    if (c->scene->dimension == 3 && !c->slice)
         silt_draw_space(c, entry);
     else
         silt_draw_flat(c, entry);
@@ -63,7 +66,16 @@ static silt_status draw_picture(silt_draw_canvas *c, const silt_frame_entry *ent
     return status;
 }
 
-silt_status silt_draw(const char *out, int frame, const char *field, const char *to, FILE *say, silt_error *err) {
+// "y=0.5"
+static bool draw_plane(const char *text, silt_draw_canvas *c) {
+    char *end = NULL;
+    c->slice = text[0] >= 'x' && text[0] <= 'z' && text[1] == '=' ? text[0] - 'x' + 1 : 0;
+    c->slice_at = c->slice ? strtod(text + 2, &end) : 0;
+    return c->slice && end > text + 2 && *end == 0 && isfinite(c->slice_at);
+}
+
+silt_status silt_draw(const char *out, int frame, const char *field, const char *slice, const char *to, FILE *say,
+                      silt_error *err) {
     enum { N_FIELD = sizeof draw_fields / sizeof draw_fields[0] };
     silt_draw_canvas canvas = {.out = out};
     silt_frame_entry *entry = NULL;
@@ -76,7 +88,10 @@ silt_status silt_draw(const char *out, int frame, const char *field, const char 
             break;
         }
     if (!canvas.field)
-        return silt_fail(err, SILT_INPUT, "field %s is not known: elevation, mesh, pressure, speed, porosity or bed", field);
+        return silt_fail(err, SILT_INPUT,
+                         "field %s is not known: mesh, pressure, speed, elevation, vorticity, porosity or bed", field);
+    if (slice && !draw_plane(slice, &canvas))
+        return silt_fail(err, SILT_INPUT, "slice %s is no plane: for example y=0.5", slice);
 
     char *path = silt_text("%s/scene.yaml", out);
     n = silt_frame_index(out, &entry);
@@ -88,7 +103,12 @@ silt_status silt_draw(const char *out, int frame, const char *field, const char 
     if (status)
         goto done;
     canvas.scene = scene;
-    if (scene->dimension == 3)
+    if ((canvas.slice && scene->dimension != 3) || (canvas.field->made == MADE_VORTICITY && scene->dimension == 3)) {
+        status = silt_fail(err, SILT_INPUT, "%s: %s", out,
+                           canvas.slice ? "a slice is for three dimensions" : "vorticity is drawn in two dimensions");
+        goto done;
+    }
+    if (scene->dimension == 3 && !canvas.slice)
         silt_draw_space_survey(&canvas, entry, n);
     else
         silt_draw_flat_survey(&canvas, entry, n);

@@ -1,5 +1,6 @@
 /** @file draw.h
- * The inside of `silt draw`, shared by draw*.c only: the canvas, colours and texts; plane pictures and pictures of space.
+ * The inside of `silt draw`, shared by draw*.c only: the canvas, colours and texts; plane pictures and pictures of
+ * space.
  */
 #ifndef SILT_DRAW_H
 #define SILT_DRAW_H
@@ -21,11 +22,14 @@ typedef struct silt_draw_colour {
     double r, g, b;
 } silt_draw_colour;
 
+/** values that no array holds */
+typedef enum { MADE_LENGTH = 0, MADE_ELEVATION, MADE_VORTICITY } silt_draw_made;
+
 typedef struct silt_draw_field {
     const char *name, *label;
-    const char *water; // array of the fluid that colours it
-    const char *bed;   // array of the bed that colours it, else its density in sand colours
-    bool elevation;    // coloured by the height of the place
+    const char *water;   // array of the fluid that colours it
+    const char *bed;     // array of the bed that colours it, else its density in sand colours
+    silt_draw_made made; // what is made of the array
     const unsigned *map;
     int n_map;
 } silt_draw_field;
@@ -36,6 +40,8 @@ typedef struct silt_draw_canvas {
     const silt_scene *scene;
     const silt_draw_field *field;
     double lo[3], hi[3]; // m, the plot's extent; in 3-D the box that is shown
+    int slice;           // 3-D: 1 to 3: a cut across x, y or z, drawn in the plane; 0: none
+    double slice_at;     // m
     double low, high;    // colour range
     double density;      // kg/m3, largest density of the bed
     double scale;        // pixels per metre
@@ -59,7 +65,8 @@ void silt_draw_text(cairo_t *cr, double x, double y, int align, double size, boo
 /** digits after the point that a step needs */
 void silt_draw_number(char text[32], double value, double step);
 void silt_draw_bar(silt_draw_canvas *c);
-/** The grid of a frame with one value a point: a vector's length, or the elevation. @return false: no such file */
+/** The grid of a frame, or its cut, with one value a point: a vector's length, or what the field makes.
+ * @return false: no such file */
 bool silt_draw_read(const silt_draw_canvas *c, silt_grid *grid, const char *part, int number, const char *array);
 /** takes the values of the points with counts[i] into the colour range */
 void silt_draw_range(silt_draw_canvas *c, const silt_grid *grid, const bool *counts);
@@ -70,6 +77,12 @@ void silt_draw_range_round(silt_draw_canvas *c);
 /** extent and colour range over some frames of the whole run, then the plot's size in pixels */
 void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, int n_frame);
 void silt_draw_flat(silt_draw_canvas *c, const silt_frame_entry *entry);
+// draw_slice.c
+/** puts the cut through the canvas' plane in place of a grid of tetrahedra */
+void silt_draw_slice(const silt_draw_canvas *c, silt_grid *grid);
+/** Walls as lines in the picture's plane, m: those that move (2-D), or the cut ones. @return how many; owned by the
+ * caller */
+int silt_draw_lines(const silt_draw_canvas *c, double time, double (**line)[4]);
 void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, int n_frame);
 void silt_draw_space(silt_draw_canvas *c, const silt_frame_entry *entry);
 

@@ -36,15 +36,22 @@ static void draw_layout(silt_draw_canvas *c) {
 void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, int n_frame) {
     double wall_lo[2] = {HUGE_VAL, HUGE_VAL}, wall_hi[2] = {-HUGE_VAL, -HUGE_VAL};
     double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL};
-    for (int i = 0; i < c->scene->n_wall; i++)
+    for (int i = 0; i < c->scene->n_wall && !c->slice; i++)
         for (int k = 0; k < c->scene->wall[i].n_point; k++)
             draw_extend(wall_lo, wall_hi, c->scene->wall[i].point[3 * k], c->scene->wall[i].point[3 * k + 1]);
+    double(*line)[4];
+    const int n_line = c->slice ? silt_draw_lines(c, entry[0].time, &line) : 0;
+    for (int i = 0; i < n_line; i++)
+        for (int k = 0; k < 4; k += 2)
+            draw_extend(wall_lo, wall_hi, line[i][k], line[i][k + 1]);
+    if (c->slice)
+        free(line);
     c->low = HUGE_VAL, c->high = -HUGE_VAL;
     int samples = n_frame < DRAW_SAMPLES ? n_frame : DRAW_SAMPLES;
     for (int s = 0; s < samples; s++) {
         int number = entry[samples > 1 ? (int)((long)s * (n_frame - 1) / (samples - 1)) : 0].number;
         static const char *const part[] = {"fluid", "bed", "grains", "bodies"};
-        for (int k = 0; k < 4; k++) {
+        for (int k = 0; k < (c->slice ? 1 : 4); k++) {
             silt_grid grid;
             const char *array = k == 0 ? c->field->water : k == 1 ? c->field->bed : NULL;
             if (!silt_draw_read(c, &grid, part[k], number, array))
@@ -241,18 +248,28 @@ static void draw_bodies(silt_draw_canvas *c, int number) {
     silt_grid_clear(&grid);
 }
 
-static void draw_walls(silt_draw_canvas *c) {
+static void draw_walls(silt_draw_canvas *c, double time) {
     silt_draw_ink(c->cr, 0x2b2b2b);
     cairo_set_line_width(c->cr, 3);
     cairo_set_line_join(c->cr, CAIRO_LINE_JOIN_MITER);
-    for (int i = 0; i < c->scene->n_wall; i++) {
+    for (int i = 0; i < c->scene->n_wall && !c->slice; i++) {
         const silt_wall *wall = &c->scene->wall[i];
-        for (int k = 0; k < wall->n_point; k++)
+        for (int k = 0; k < wall->n_point && wall->motion.n_row == 0; k++)
             cairo_line_to(c->cr, draw_x(c, wall->point[3 * k]), draw_y(c, wall->point[3 * k + 1]));
         if (wall->closed)
             cairo_close_path(c->cr);
         cairo_stroke(c->cr);
     }
+    // those that move, or the cut ones
+    double(*line)[4];
+    const int n = silt_draw_lines(c, time, &line);
+    cairo_set_line_cap(c->cr, CAIRO_LINE_CAP_ROUND);
+    for (int i = 0; i < n; i++) {
+        cairo_move_to(c->cr, draw_x(c, line[i][0]), draw_y(c, line[i][1]));
+        cairo_line_to(c->cr, draw_x(c, line[i][2]), draw_y(c, line[i][3]));
+        cairo_stroke(c->cr);
+    }
+    free(line);
 }
 
 // ---------------------------------------------------------------- axes
@@ -283,11 +300,11 @@ static void draw_axes(silt_draw_canvas *c) {
         silt_draw_number(text, y, step);
         silt_draw_text(cr, left - 11, p, 1, 14, false, text);
     }
-    silt_draw_text(cr, left + 0.5 * c->width, bottom + 44, 0, 15, false, "x, m");
+    silt_draw_text(cr, left + 0.5 * c->width, bottom + 44, 0, 15, false, c->slice == 1 ? "y, m" : "x, m");
     cairo_save(cr);
     cairo_translate(cr, 20, MARGIN_TOP + 0.5 * c->height);
     cairo_rotate(cr, -M_PI / 2);
-    silt_draw_text(cr, 0, 0, 0, 15, false, "y, m");
+    silt_draw_text(cr, 0, 0, 0, 15, false, c->slice == 1 || c->slice == 2 ? "z, m" : "y, m");
     cairo_restore(cr);
 }
 
@@ -296,10 +313,12 @@ void silt_draw_flat(silt_draw_canvas *c, const silt_frame_entry *entry) {
     cairo_rectangle(c->cr, MARGIN_LEFT, MARGIN_TOP, c->width, c->height);
     cairo_clip(c->cr);
     draw_water(c, entry->number);
-    draw_bed(c, entry->number);
-    draw_grains(c, entry->number);
-    draw_bodies(c, entry->number);
-    draw_walls(c);
+    if (!c->slice) {
+        draw_bed(c, entry->number);
+        draw_grains(c, entry->number);
+        draw_bodies(c, entry->number);
+    }
+    draw_walls(c, entry->time);
     cairo_restore(c->cr);
     draw_axes(c);
 }

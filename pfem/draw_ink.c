@@ -27,19 +27,50 @@ silt_draw_colour silt_draw_value(const silt_draw_canvas *c, double value) {
 
 // ---------------------------------------------------------------- values
 
+// 2-D: curl of the velocity at the points, mean of their cells by area
+static void draw_vorticity(silt_grid *grid) {
+    double *area = silt_alloc((size_t)grid->n_point + 1, sizeof *area),
+           *curl = silt_alloc((size_t)grid->n_point + 1, sizeof *curl);
+    for (int i = 0; i < grid->n_cell; i++) {
+        const int *node = grid->link + grid->offset[i];
+        double twice = 0, turn = 0;
+        for (int k = 0; k < 3 && silt_grid_corners(grid, i) == 3; k++) {
+            const double *a = grid->x + 3 * node[k], *b = grid->x + 3 * node[(k + 1) % 3];
+            const double *v = grid->value + 3 * node[k], *w = grid->value + 3 * node[(k + 1) % 3];
+            twice += a[0] * b[1] - a[1] * b[0];
+            // circulation along the edge
+            turn += 0.5 * ((v[0] + w[0]) * (b[0] - a[0]) + (v[1] + w[1]) * (b[1] - a[1]));
+        }
+        for (int k = 0; k < 3 && twice > 0; k++) {
+            area[node[k]] += 0.5 * twice;
+            curl[node[k]] += turn;
+        }
+    }
+    for (int i = 0; i < grid->n_point; i++)
+        grid->value[i] = area[i] > 0 ? curl[i] / area[i] : 0;
+    free(area);
+    free(curl);
+}
+
 bool silt_draw_read(const silt_draw_canvas *c, silt_grid *grid, const char *part, int number, const char *array) {
     if (!silt_grid_read(grid, c->out, part, number, array))
         return false;
-    if (grid->width == 3)
+    if (array && c->field->made == MADE_ELEVATION) {
+        free(grid->value);
+        grid->value = silt_alloc((size_t)grid->n_point + 1, sizeof *grid->value);
+        for (int i = 0; i < grid->n_point; i++)
+            grid->value[i] = grid->x[3 * i + (c->scene->dimension == 3 ? 2 : 1)];
+    } else if (grid->width == 3 && c->field->made == MADE_VORTICITY && c->scene->dimension != 3) {
+        draw_vorticity(grid);
+    } else if (grid->width == 3) {
         for (int i = 0; i < grid->n_point; i++) {
             const double *v = grid->value + 3 * i;
             grid->value[i] = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
         }
-    if (array && c->field->elevation && !grid->value) {
-        grid->value = silt_alloc((size_t)grid->n_point + 1, sizeof *grid->value);
-        for (int i = 0; i < grid->n_point; i++)
-            grid->value[i] = grid->x[3 * i + (c->scene->dimension == 3 ? 2 : 1)];
     }
+    grid->width = grid->value ? 1 : 0;
+    if (c->slice)
+        silt_draw_slice(c, grid);
     return true;
 }
 
@@ -64,6 +95,11 @@ void silt_draw_range(silt_draw_canvas *c, const silt_grid *grid, const bool *cou
 
 // speed and work begin at 0, the ends of the range are round
 void silt_draw_range_round(silt_draw_canvas *c) {
+    // what turns either way is shown with white in the middle
+    if (c->field->made == MADE_VORTICITY && c->low < HUGE_VAL) {
+        c->high = silt_max(fabs(c->low), fabs(c->high));
+        c->low = -c->high;
+    }
     if (!(c->low < HUGE_VAL))
         c->low = 0, c->high = 1;
     if (c->low > 0 && c->low < 0.5 * c->high)

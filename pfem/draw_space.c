@@ -159,7 +159,8 @@ static void space_line(space *s, const double *a, const double *b, double lift, 
         const double t = (double)i / n, x = p[0] + t * (q[0] - p[0]), y = p[1] + t * (q[1] - p[1]);
         for (int dy = -r; dy <= r; dy++)
             for (int dx = -r; dx <= r; dx++)
-                if (silt_square(floor(x) + dx + 0.5 - x) + silt_square(floor(y) + dy + 0.5 - y) <= 0.25 * width * width + 0.25)
+                if (silt_square(floor(x) + dx + 0.5 - x) + silt_square(floor(y) + dy + 0.5 - y) <=
+                    0.25 * width * width + 0.25)
                     space_dab(s, (int)floor(x) + dx, (int)floor(y) + dy, p[2] + t * (q[2] - p[2]) + lift, ink, 1);
     }
 }
@@ -201,7 +202,8 @@ static bool space_sharp(const silt_walls *walls, int element, int edge) {
 
 // faces that the water's side turns to the eye; edges of all, those of faces seen from behind thin
 static void space_walls(space *s, const silt_walls *walls) {
-    const silt_draw_colour grey = silt_draw_hex(0xe4e6e8), dark = silt_draw_hex(0x54585c), pale = silt_draw_hex(0xa9adb1);
+    const silt_draw_colour grey = silt_draw_hex(0xe4e6e8), dark = silt_draw_hex(0x54585c),
+                           pale = silt_draw_hex(0xa9adb1);
     const double lift = space_lift(s);
     for (int i = 0; i < walls->count; i++) {
         const double facing = space_dot(walls->normal[i], s->eye);
@@ -402,7 +404,8 @@ static void space_show(space *s) {
         for (int x = 0; x < c->width; x++) {
             double sum[3] = {0, 0, 0};
             for (int k = 0; k < SPACE_FINE * SPACE_FINE; k++) {
-                const size_t at = (size_t)(SPACE_FINE * y + k / SPACE_FINE) * (size_t)s->width + (size_t)(SPACE_FINE * x + k % SPACE_FINE);
+                const size_t at = (size_t)(SPACE_FINE * y + k / SPACE_FINE) * (size_t)s->width +
+                                  (size_t)(SPACE_FINE * x + k % SPACE_FINE);
                 for (int d = 0; d < 3; d++)
                     sum[d] += (double)s->ink[at][d] / (SPACE_FINE * SPACE_FINE);
             }
@@ -414,7 +417,8 @@ static void space_show(space *s) {
 }
 
 void silt_draw_space(silt_draw_canvas *c, const silt_frame_entry *entry) {
-    space s = {.c = c, .width = SPACE_FINE * c->width, .height = SPACE_FINE * c->height, .scale = SPACE_FINE * c->scale};
+    space s = {
+        .c = c, .width = SPACE_FINE * c->width, .height = SPACE_FINE * c->height, .scale = SPACE_FINE * c->scale};
     const size_t n = (size_t)s.width * (size_t)s.height;
     silt_walls walls = {0};
     space_frame(&s);

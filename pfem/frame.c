@@ -101,8 +101,8 @@ static silt_status frame_close(frame_file *f, silt_error *err) {
 
 // ---------------------------------------------------------------- points of the water
 
-/** The nodes as points of a file. Cells that join nodes across a periodic border get copies of the far ones beside the near
- * ones: nothing is stretched over the domain. */
+/** The nodes as points of a file. Cells that join nodes across a periodic border get copies of the far ones beside the
+ * near ones: nothing is stretched over the domain. */
 typedef struct frame_cloud {
     const silt_view *view;
     int n, node_capacity, x_capacity;
@@ -495,8 +495,7 @@ static silt_status frame_log(const char *out, int number, const silt_view *view,
 typedef silt_status frame_writer(const char *out, int number, const silt_view *view, silt_error *err);
 
 silt_status silt_frame_write(const char *out, int number, const silt_view *view, silt_error *err) {
-    static frame_writer *const write[FRAME_PARTS] = {frame_fluid, frame_surface, frame_bed, frame_grains,
-                                                       frame_bodies};
+    static frame_writer *const write[FRAME_PARTS] = {frame_fluid, frame_surface, frame_bed, frame_grains, frame_bodies};
     const bool water = view->nodes && view->mesh;
     const bool has[FRAME_PARTS] = {water, water && silt_nodes_dim(view->nodes) == 3, view->bed && view->scene->bed.on,
                                    view->scene->grains.on, view->bodies && view->bodies->count > 0};

@@ -295,7 +295,8 @@ static double gauge_dot(int dim, const double *a, const double *b) {
     return a[0] * b[0] + a[1] * b[1] + (dim == 3 ? a[2] * b[2] : 0);
 }
 
-// weights of the point of a segment (n = 2) or triangle (n = 3) that is nearest to a point; @return its distance squared
+// weights of the point of a segment (n = 2) or triangle (n = 3) that is nearest to a point; @return its distance
+// squared
 static double gauge_nearest(int dim, int n, const double *corner, const double *point, double *weight) {
     double e[2][3] = {{0}}, r[3] = {0}, g[2][2] = {{0}}, b[2] = {0};
     for (int k = 1; k < n; k++)
@@ -518,8 +519,7 @@ void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value)
             if (level > -HUGE_VAL)
                 value[0] = def->kind == GAUGE_SCOUR ? gauges->start[i] - level : level;
         } else if (water) {
-            if (!connected &&
-                (def->kind == GAUGE_FRONT || def->kind == GAUGE_HEIGHT || def->kind == GAUGE_EXTENT)) {
+            if (!connected && (def->kind == GAUGE_FRONT || def->kind == GAUGE_HEIGHT || def->kind == GAUGE_EXTENT)) {
                 gauge_connect(gauges, view);
                 connected = true;
             }

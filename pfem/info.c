@@ -18,8 +18,10 @@ static void info_scene(const silt_scene *scene, FILE *to) {
         double area = 0;
         for (int i = 0; i < fluid->n_region; i++)
             area += silt_region_area(&fluid->region[i]);
-        fprintf(to, "  water      %g kg/m3, %g Pa s, spacing %g m, %d regions of %g m2: about %.0f nodes\n",
-                fluid->density, fluid->viscosity, fluid->size, fluid->n_region, area, area / silt_square(fluid->size));
+        const bool space = scene->dimension == 3;
+        fprintf(to, "  water      %g kg/m3, %g Pa s, spacing %g m, %d regions of %g %s: about %.0f nodes\n",
+                fluid->density, fluid->viscosity, fluid->size, fluid->n_region, area, space ? "m3" : "m2",
+                area / (silt_square(fluid->size) * (space ? fluid->size : 1)));
         if (fluid->n_inlet || fluid->n_outlet)
             fprintf(to, "  openings   %d inlets, %d outlets\n", fluid->n_inlet, fluid->n_outlet);
     }

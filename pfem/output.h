@@ -124,8 +124,10 @@ silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_ch
 silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err);
 /** Holds OUT against the checks of OUT/scene.yaml; prints a line a check to `to`. SILT_FAILED when one fails. */
 silt_status silt_verify(const char *out, FILE *to, silt_error *err);
-/** PNG pictures of frames: frame -1 all, -2 the last; field: mesh, pressure, speed, porosity, bed. Written as OUT/picture_NNNNNN.png */
-silt_status silt_draw(const char *out, int frame, const char *field, const char *to, FILE *say, silt_error *err);
+/** PNG pictures of frames: frame -1 all, -2 the last; field: mesh, pressure, speed, elevation, vorticity, porosity, bed (NULL:
+ * speed); slice: "y=0.5" for a plane cut through three dimensions, NULL: none; written as TO/picture_NNNNNN.png (NULL: OUT) */
+silt_status silt_draw(const char *out, int frame, const char *field, const char *slice, const char *to, FILE *say,
+                      silt_error *err);
 silt_status silt_info(const char *path, FILE *to, silt_error *err);
 /** warn.c: prints what is allowed but probably not meant, a line each; @return how many */
 int silt_scene_warn(const silt_scene *scene, FILE *to);

@@ -23,14 +23,17 @@ typedef struct world {
 } world;
 
 static double cube_volume(const int *cell) {
-    const double *a = cube_x + 3 * cell[0], *b = cube_x + 3 * cell[1], *c = cube_x + 3 * cell[2], *d = cube_x + 3 * cell[3];
+    const double *a = cube_x + 3 * cell[0], *b = cube_x + 3 * cell[1], *c = cube_x + 3 * cell[2],
+                 *d = cube_x + 3 * cell[3];
     double u[3], v[3], w[3];
     for (int k = 0; k < 3; k++) {
         u[k] = b[k] - a[k];
         v[k] = c[k] - a[k];
         w[k] = d[k] - a[k];
     }
-    return (u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6;
+    return (u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) +
+            u[2] * (v[0] * w[1] - v[1] * w[0])) /
+           6;
 }
 
 // faces of one cell only, counter-clockwise from outside
@@ -266,7 +269,8 @@ static void test_frames(void **state) {
         const double *a = grid.x + 3 * grid.link[3 * i], *b = grid.x + 3 * grid.link[3 * i + 1],
                      *c = grid.x + 3 * grid.link[3 * i + 2];
         volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
-                   a[2] * (b[0] * c[1] - b[1] * c[0])) / 6;
+                   a[2] * (b[0] * c[1] - b[1] * c[0])) /
+                  6;
     }
     near(volume, 1.1045, 1e-14);
     for (int i = 0; i < grid.n_point; i++)
@@ -310,8 +314,7 @@ static void ring_make(world *w) {
                 ring_cell[n][2] = 2 * i + 1;
             }
         }
-    w->nodes = (silt_nodes){
-        .count = 2 * RING, .x = ring_x, .v = ring_v, .p = ring_p, .id = ring_id, .kind = ring_kind};
+    w->nodes = (silt_nodes){.count = 2 * RING, .x = ring_x, .v = ring_v, .p = ring_p, .id = ring_id, .kind = ring_kind};
     w->mesh = (silt_mesh){.revision = 1,
                           .period = {1},
                           .n_node = 2 * RING,
@@ -490,6 +493,56 @@ static void test_profiles(void **state) {
 
 // ---------------------------------------------------------------- pictures
 
+// sections of the cube and of the drop: area, values, and one outline each
+static void test_slice(void **state) {
+    (void)state;
+    static const struct {
+        int axis;
+        double at, area, p[3]; // pressure is p[0] + p[1] u + p[2] v
+        int outline;
+    } cut[] = {{1, 0.5, 1.1, {10.5, 0, -4}, 0},
+               {2, 0.5, 1.1, {10, 1, -4}, 0},
+               {3, 0.25, 1 + 0.5 * 0.05 * 0.05, {9, 1, 0}, 0},
+               {1, 2.1, 0.5 * 0.2 * 0.2, {12.1, 0, -4}, 3}};
+    const silt_draw_field field = {"pressure", "pressure, Pa", "PointData/pressure", NULL, MADE_LENGTH, NULL, 0};
+    world w;
+    silt_error err = {0};
+    world_make(&w);
+    assert_int_equal(silt_frame_write(folder, 0, &w.view, &err), SILT_OK);
+    for (int i = 0; i < 4; i++) {
+        const silt_draw_canvas c = {
+            .out = folder, .scene = &w.scene, .field = &field, .slice = cut[i].axis, .slice_at = cut[i].at};
+        silt_grid grid;
+        double area = 0;
+        assert_true(silt_draw_read(&c, &grid, "fluid", 0, field.water));
+        for (int k = 0; k < grid.n_cell; k++) {
+            const double *a = grid.x + 3 * grid.link[3 * k], *b = grid.x + 3 * grid.link[3 * k + 1],
+                         *d = grid.x + 3 * grid.link[3 * k + 2];
+            area += 0.5 * fabs((b[0] - a[0]) * (d[1] - a[1]) - (b[1] - a[1]) * (d[0] - a[0]));
+        }
+        near(area, cut[i].area, 1e-14);
+        // an edge that one triangle has is the outline: as long as the triangles share their points
+        int edges = 0;
+        for (int k = 0; k < 3 * grid.n_cell; k++) {
+            const int a = grid.link[k], b = grid.link[k % 3 == 2 ? k - 2 : k + 1];
+            int same = 0;
+            for (int m = 0; m < 3 * grid.n_cell; m++) {
+                const int p = grid.link[m], q = grid.link[m % 3 == 2 ? m - 2 : m + 1];
+                same += (p == a && q == b) || (p == b && q == a);
+            }
+            assert_true(same == 1 || same == 2);
+            edges += same == 1;
+        }
+        assert_true(edges < 3 * grid.n_cell || grid.n_cell == 1);
+        if (cut[i].outline)
+            assert_int_equal(edges, cut[i].outline);
+        for (int k = 0; k < grid.n_point; k++)
+            near(grid.value[k], cut[i].p[0] + cut[i].p[1] * grid.x[3 * k] + cut[i].p[2] * grid.x[3 * k + 1], 1e-13);
+        silt_grid_clear(&grid);
+    }
+    assert_int_equal(silt_frame_cut(folder, -1, &err), SILT_OK);
+}
+
 // the colour of a pixel that shows a point of the world
 static unsigned pixel(const silt_draw_canvas *c, int x, int y) {
     const uint8_t *row = cairo_image_surface_get_data(c->surface) + y * cairo_image_surface_get_stride(c->surface);
@@ -499,7 +552,7 @@ static unsigned pixel(const silt_draw_canvas *c, int x, int y) {
 static void test_draw(void **state) {
     (void)state;
     static const unsigned map[] = {0x000000, 0xffffff};
-    const silt_draw_field field = {"pressure", "pressure, Pa", "PointData/pressure", NULL, false, map, 2};
+    const silt_draw_field field = {"pressure", "pressure, Pa", "PointData/pressure", NULL, MADE_LENGTH, map, 2};
     const silt_frame_entry entry = {0, 0};
     world w;
     silt_error err = {0};
@@ -530,7 +583,8 @@ static void test_draw(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_gauges),   cmocka_unit_test(test_wall_forces), cmocka_unit_test(test_frames),
-        cmocka_unit_test(test_periodic), cmocka_unit_test(test_profiles),    cmocka_unit_test(test_draw),
+        cmocka_unit_test(test_periodic), cmocka_unit_test(test_profiles),    cmocka_unit_test(test_slice),
+        cmocka_unit_test(test_draw),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -261,24 +261,25 @@ static void test_keys(void **state) {
     silt_error err = {0};
     silt_scene *scene = NULL, *again = NULL;
     make("curve.csv", "t,x\n1,1\n2,4\n");
-    make("keys.yaml", "silt: 1\n"
-                      "time: {end: 10, output: 0.25}\n"
-                      "gravity: [0, -9.81]\n"
-                      "fluid: {density: 1000, viscosity: 0.001, size: 0.1, regions: [{box: [[0, 0], [1, 1]]}]}\n"
-                      "walls: [{polyline: [[0, 2], [0, 0], [4, 0], [4, 2]]}]\n"
-                      "gauges:\n"
-                      "  - {name: wide, extent: x}\n"
-                      "  - {name: push, force_on: 0}\n"
-                      "  - {name: turn, angular_momentum_about: [0.5, 0.25]}\n"
-                      "  - {name: middle, centroid_of: water}\n"
-                      "checks:\n"
-                      "  - {name: at, column: wide, scalar: at, at: 2, value: 1, tolerance: 0.1}\n"
-                      "  - {name: arrives, column: push_x, scalar: reaches, level: 5, range: [0, 1]}\n"
-                      "  - {name: period, gauge: turn, scalar: period, level: 0.5, range: [0, 1]}\n"
-                      "  - {name: decay, column: middle_y, scalar: decay, value: 1, tolerance: 0.1}\n"
-                      "  - {name: line, profile: velocity_x, at: 3, line: [[1, 0], [1, 2]], place_scale: 2, place_shift: -1,\n"
-                      "     scale: 4, shift: 1, reference: curve.csv, tolerance: 0.1}\n"
-                      "  - {name: surface, profile: surface, at: 0, reference: curve.csv, tolerance: 0.1}\n");
+    make("keys.yaml",
+         "silt: 1\n"
+         "time: {end: 10, output: 0.25}\n"
+         "gravity: [0, -9.81]\n"
+         "fluid: {density: 1000, viscosity: 0.001, size: 0.1, regions: [{box: [[0, 0], [1, 1]]}]}\n"
+         "walls: [{polyline: [[0, 2], [0, 0], [4, 0], [4, 2]]}]\n"
+         "gauges:\n"
+         "  - {name: wide, extent: x}\n"
+         "  - {name: push, force_on: 0}\n"
+         "  - {name: turn, angular_momentum_about: [0.5, 0.25]}\n"
+         "  - {name: middle, centroid_of: water}\n"
+         "checks:\n"
+         "  - {name: at, column: wide, scalar: at, at: 2, value: 1, tolerance: 0.1}\n"
+         "  - {name: arrives, column: push_x, scalar: reaches, level: 5, range: [0, 1]}\n"
+         "  - {name: period, gauge: turn, scalar: period, level: 0.5, range: [0, 1]}\n"
+         "  - {name: decay, column: middle_y, scalar: decay, value: 1, tolerance: 0.1}\n"
+         "  - {name: line, profile: velocity_x, at: 3, line: [[1, 0], [1, 2]], place_scale: 2, place_shift: -1,\n"
+         "     scale: 4, shift: 1, reference: curve.csv, tolerance: 0.1}\n"
+         "  - {name: surface, profile: surface, at: 0, reference: curve.csv, tolerance: 0.1}\n");
     if (silt_scene_read(place("keys.yaml"), 0, NULL, &scene, &err))
         fail_msg("%s", err.text);
     const silt_gauge_def *g = scene->gauge;
@@ -365,11 +366,8 @@ static void test_verify(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_checks_scalar),
-        cmocka_unit_test(test_checks_decay),
-        cmocka_unit_test(test_checks_curve),
-        cmocka_unit_test(test_keys),
-        cmocka_unit_test(test_verify),
+        cmocka_unit_test(test_checks_scalar), cmocka_unit_test(test_checks_decay), cmocka_unit_test(test_checks_curve),
+        cmocka_unit_test(test_keys),          cmocka_unit_test(test_verify),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
