@@ -392,6 +392,11 @@ typedef struct silt_ledger {
     double max_speed;                             // m/s, of the water's nodes
     // where volume went, cumulative, m3: solved (divergence left), moved (integration), reconnected (remeshing, nodes added and removed)
     double volume_solved, volume_moved, volume_reconnected;
+    double volume_refined; // nodes added and removed, cumulative
+    double volume_given;   // debts paid, cumulative
+    double volume_owed;    // debts of wet nodes that are still to be paid
+    double y_plus;         // distance of the wall law's sample in wall units, mean by length or area of its facets; NaN: none
+    double angular_momentum[3]; // kg m/s times m, of the water about the origin; in 2-D the last only
     // the larger of two, of the last step's solve: force on the water that its inertia does not answer, relative to weight and
     // inertia; force of the grains on the water plus force of the water on the grains, relative to what they exchange
     double momentum_error;
