@@ -47,3 +47,9 @@ void silt_formula_velocity(const silt_formula *formula, double g, const double *
         break;
     }
 }
+
+void silt_formula_acceleration(const silt_formula *formula, double time, const double *x, double *a) {
+    (void)time;
+    for (int d = 0; d < 3; d++)
+        a[d] = formula->kind == FORMULA_CENTRAL ? -silt_square(formula->rate) * (x[d] - formula->centre[d]) : formula->vector[d];
+}

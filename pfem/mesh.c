@@ -151,10 +151,8 @@ void silt_cell_corners(const silt_mesh *mesh, const double *x, const int *cell, 
         }
 }
 
-double silt_cell_volume(const silt_mesh *mesh, const double *x, int e) {
-    double c[12];
-    silt_cell_corners(mesh, x, mesh->cell[e], c);
-    if (mesh->dim != 3)
+double silt_simplex_volume(int dim, const double *c) {
+    if (dim == 2)
         return 0.5 * ((c[2] - c[0]) * (c[5] - c[1]) - (c[3] - c[1]) * (c[4] - c[0]));
     double u[3], v[3], w[3];
     for (int d = 0; d < 3; d++) {
@@ -163,4 +161,10 @@ double silt_cell_volume(const silt_mesh *mesh, const double *x, int e) {
         w[d] = c[9 + d] - c[d];
     }
     return (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6;
+}
+
+double silt_cell_volume(const silt_mesh *mesh, const double *x, int e) {
+    double corner[12];
+    silt_cell_corners(mesh, x, mesh->cell[e], corner);
+    return silt_simplex_volume(mesh->dim == 3 ? 3 : 2, corner);
 }

@@ -144,6 +144,8 @@ typedef struct silt_mesh {
 void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes);
 void silt_mesh_clear(silt_mesh *mesh);
 double silt_cell_area(const double *x, const int *cell); // 2-D
+/** m2 or m3 of a triangle or tetrahedron from its corners, dim numbers each */
+double silt_simplex_volume(int dim, const double *corner);
 /** m2 or m3 of a cell of the mesh, across a periodic border too */
 double silt_cell_volume(const silt_mesh *mesh, const double *x, int e);
 /** corners of a cell, dim numbers each, joined the shortest way across a periodic border */

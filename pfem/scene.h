@@ -314,6 +314,8 @@ bool silt_chain_crosses(int n, const double *point, bool closed, int crossing[2]
 
 /** velocity of the formula at x, m/s; g is the gravity's magnitude (standing wave) */
 void silt_formula_velocity(const silt_formula *formula, double g, const double *x, double *v);
+/** acceleration of the formula at time and x, m/s2 */
+void silt_formula_acceleration(const silt_formula *formula, double time, const double *x, double *a);
 
 /** Prints what the table of keys says: one line per key when key is NULL, a block's keys, or all about one key
  * ("fluid.size", "bodies.density"; a last part alone will do). Errors: SILT_INPUT, no such key, with the nearest. */

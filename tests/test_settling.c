@@ -228,7 +228,8 @@ static void test_water_and_grain_together(void **unused) {
         memcpy(run.x_old, run.nodes.x, 2 * (size_t)n * sizeof *run.x_old);
         OK(silt_coupling_dem.prepare(run.coupling, &run.nodes, &run.mesh, run.dt, &run.drag, &error));
         assert_non_null(run.drag);
-        OK(silt_fluid_step(&run.fluid, scene, &run.walls, &run.nodes, &run.mesh, run.drag, run.dt, &error));
+        const silt_step now = {.scene = scene, .walls = &run.walls, .mesh = &run.mesh, .drag = run.drag, .nodes = &run.nodes, .dt = run.dt};
+        OK(silt_fluid_step(&run.fluid, &now, &error));
         silt_nodes moving = run.nodes;
         moving.v = run.fluid.w;
         silt_coupling_dem.load(run.coupling, &moving, &run.mesh, run.dt);
