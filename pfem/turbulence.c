@@ -244,7 +244,7 @@ bool silt_viscosity_varies(const silt_scene *scene) {
 }
 
 void silt_viscosity_update(const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh, const silt_depth *depth,
-                           const double *grad, const double *volume, const double *v, double blend, double *mu,
+                           const double *flux, const double *inverse, const double *v, double blend, double *mu,
                            silt_viscosity_report *report) {
     const silt_fluid_def *fluid = &scene->fluid;
     const silt_turbulence model = silt_turbulence_model(scene);
@@ -257,7 +257,7 @@ void silt_viscosity_update(const silt_scene *scene, const silt_nodes *nodes, con
         for (int a = 0; a <= dim; a++)
             for (int d = 0; d < dim; d++)
                 for (int k = 0; k < dim; k++)
-                    gradient[dim * d + k] += v[dim * cell[a] + d] * grad[((dim + 1) * e + a) * dim + k];
+                    gradient[dim * d + k] += v[dim * cell[a] + d] * inverse[e] * flux[((dim + 1) * e + a) * dim + k];
         const double rate = silt_shear_rate(dim, gradient);
 
         double eddy = 0;
@@ -275,7 +275,7 @@ void silt_viscosity_update(const silt_scene *scene, const silt_nodes *nodes, con
             if (s == HUGE_VAL && d < HUGE_VAL)
                 s = silt_max(depth->enclosed - d, 0);
             const double mixing = silt_square(silt_mixing_length(d, s)) * rate;
-            const double delta = dim == 3 ? cbrt(volume[e]) : sqrt(volume[e]);
+            const double delta = 1 / (dim == 3 ? cbrt(inverse[e]) : sqrt(inverse[e]));
             if (model == TURBULENCE_MIXING_LENGTH)
                 eddy = mixing;
             else
@@ -286,8 +286,8 @@ void silt_viscosity_update(const silt_scene *scene, const silt_nodes *nodes, con
         eddy *= fluid->density;
         const double fresh = silt_apparent_viscosity(fluid, rate) + eddy;
         mu[e] = blend < 1 ? (1 - blend) * mu[e] + blend * fresh : fresh;
-        whole += volume[e];
-        sum += volume[e] * eddy;
+        whole += 1 / inverse[e];
+        sum += eddy / inverse[e];
         most = silt_max(most, eddy);
         fastest = silt_max(fastest, rate);
     }

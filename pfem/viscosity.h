@@ -1,8 +1,8 @@
 /** @file viscosity.h
  * How water and mud resist being sheared: depth and distance to walls, eddy viscosity (turbulence.c), apparent viscosity of
  * yield-stress fluids (rheology.c), traction of walls whose boundary layer is thinner than a cell (wall_law.c).
- * Everything works in two and three dimensions: positions and velocities have `dim` numbers a node, shape gradients
- * (dim + 1) * dim numbers a cell (node by node), velocity gradients dim * dim numbers, row d holding dv_d/dx_k.
+ * Everything works in two and three dimensions: positions and velocities have `dim` numbers a node, velocity gradients
+ * dim * dim numbers, row d holding dv_d/dx_k.
  *
  * In a step of the water:
  *   once    silt_depth_update, silt_wall_law_place
@@ -68,15 +68,15 @@ bool silt_viscosity_varies(const silt_scene *scene);
 /** Viscosity of every cell: molecular or apparent (rheology) plus eddy viscosity.
  * Where the model is Smagorinsky or WALE, cells below the height at which the law of the wall looks at the water get at least
  * the mixing length's viscosity: nothing else there could carry the wall's traction into the water.
- * @param grad    (dim + 1) * dim per cell, 1/m
- * @param volume  one per cell, m2 or m3
+ * @param flux    (dim + 1) * dim per cell, node by node: its volume times the gradients of the shape functions
+ * @param inverse one per cell, 1/volume
  * @param v       dim per node, m/s
  * @param blend   share of the new value, the rest is what mu holds: 1 at first, 0.5 in iterations (Newton's square root: a stress
  *                quadratic in the rate, taken with the old rate times the new, would jump to and fro for ever)
  * @param mu      out, one per cell, Pa s
  * @param report  out, may be NULL */
 void silt_viscosity_update(const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh, const silt_depth *depth,
-                           const double *grad, const double *volume, const double *v, double blend, double *mu,
+                           const double *flux, const double *inverse, const double *v, double blend, double *mu,
                            silt_viscosity_report *report);
 
 // ---------------------------------------------------------------- rheology.c

@@ -28,7 +28,7 @@ typedef struct column {
     silt_mesh mesh;
     silt_depth depth;
     silt_wall_law law;
-    double *grad, *volume, *mu, *v, *friction, *force, *mass; // mass per row
+    double *flux, *grad, *volume, *inverse, *mu, *v, *friction, *force, *mass; // mass per row
     int passes;
 } column;
 
@@ -159,6 +159,8 @@ static void column_open(column *c, int dim, int n_row, double height) {
     connect(c);
 
     c->grad = silt_alloc((size_t)(m->n_cell * (dim + 1) * dim), sizeof(double));
+    c->flux = silt_alloc((size_t)(m->n_cell * (dim + 1) * dim), sizeof(double));
+    c->inverse = silt_alloc((size_t)m->n_cell, sizeof(double));
     c->volume = silt_alloc((size_t)m->n_cell, sizeof(double));
     c->mu = silt_alloc((size_t)m->n_cell, sizeof(double));
     c->v = silt_alloc((size_t)(dim * nodes->count), sizeof(double));
@@ -184,6 +186,9 @@ static void column_open(column *c, int dim, int n_row, double height) {
                 g[dim * (k + 1) + d] = (a[k1][d1] * a[k2][d2] - a[k1][d2] * a[k2][d1]) / det;
                 g[d] -= g[dim * (k + 1) + d];
             }
+        c->inverse[e] = 1 / c->volume[e];
+        for (int k = 0; k < (dim + 1) * dim; k++)
+            c->flux[e * (dim + 1) * dim + k] = c->volume[e] * g[k];
         for (int b = 0; b <= dim; b++)
             c->mass[m->cell[e][b] / c->plane] += 1000 * c->volume[e] / (dim + 1);
     }
@@ -196,6 +201,8 @@ static void column_close(column *c) {
     silt_depth_clear(&c->depth);
     silt_wall_law_clear(&c->law);
     free(c->grad);
+    free(c->flux);
+    free(c->inverse);
     free(c->volume);
     free(c->mu);
     free(c->v);
@@ -215,7 +222,7 @@ static void column_step(column *c, double g, double dt, int most) {
         old[r] = c->v[dim * r * c->plane];
     double change = HUGE_VAL;
     for (c->passes = 0; c->passes < most && change > 1e-10; c->passes++) {
-        silt_viscosity_update(&c->scene, &c->nodes, m, &c->depth, c->grad, c->volume, c->v, c->passes == 0 ? 1 : 0.5, c->mu, NULL);
+        silt_viscosity_update(&c->scene, &c->nodes, m, &c->depth, c->flux, c->inverse, c->v, c->passes == 0 ? 1 : 0.5, c->mu, NULL);
         silt_wall_law_traction(&c->law, &c->scene, dim, c->v, c->friction, c->force);
         for (int r = 0; r < n; r++) {
             diagonal[r] = c->mass[r] / dt;
@@ -240,7 +247,6 @@ static void column_step(column *c, double g, double dt, int most) {
         if (c->walls.slip[0] == 0) {
             diagonal[0] = 1;
             right[0] = 0;
-            right[1] -= 0;
             lower[1] = 0;
         }
         double *upper = silt_alloc((size_t)n, sizeof(double)); // symmetric but for the held row
