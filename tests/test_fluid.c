@@ -30,7 +30,7 @@ static void bench_open(bench *b, const char *format, ...) {
     if (silt_scene_read(path, 0, NULL, &b->scene, &err) != SILT_OK)
         fail_msg("%s", err.text);
     unlink(path);
-    silt_walls_create(&b->walls, b->scene);
+    silt_walls_create(&b->walls, b->scene, NULL);
     silt_nodes_seed(&b->nodes, b->scene, &b->walls, NULL, NULL);
     const silt_barrier barrier = {.walls = &b->walls};
     assert_int_equal(silt_mesh_first(&b->mesh, &b->nodes, b->scene, &barrier, &err), SILT_OK);
@@ -46,7 +46,8 @@ static void bench_close(bench *b) {
 
 static void step(bench *b, double dt) {
     silt_error err = {0};
-    if (silt_fluid_step(&b->fluid, b->scene, &b->walls, &b->nodes, &b->mesh, NULL, dt, &err) != SILT_OK)
+    const silt_step step = {.scene = b->scene, .walls = &b->walls, .mesh = &b->mesh, .nodes = &b->nodes, .dt = dt};
+    if (silt_fluid_step(&b->fluid, &step, &err) != SILT_OK)
         fail_msg("%s", err.text);
 }
 
@@ -195,7 +196,8 @@ static void test_failure_keeps_the_state(void **state) {
     memcpy(v, b.nodes.v, bytes);
     memcpy(p, b.nodes.p, bytes / 2);
     silt_error err = {0};
-    assert_int_equal(silt_fluid_step(&b.fluid, b.scene, &b.walls, &b.nodes, &b.mesh, NULL, NAN, &err), SILT_FAILED);
+    const silt_step never = {.scene = b.scene, .walls = &b.walls, .mesh = &b.mesh, .nodes = &b.nodes, .dt = NAN};
+    assert_int_equal(silt_fluid_step(&b.fluid, &never, &err), SILT_FAILED);
     assert_true(strlen(err.text) > 20);
     assert_memory_equal(v, b.nodes.v, bytes);
     assert_memory_equal(p, b.nodes.p, bytes / 2);
