@@ -93,6 +93,7 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
         return SILT_OK;
 
     // bodies and bed first: the water keeps its distance
+    run->nodes.dim = scene->dimension;
     for (int b = 0; run->barrier.bodies && b < run->barrier.bodies->count; b++) {
         const struct silt_body *body = &run->barrier.bodies->body[b];
         const double c = 1 - 2 * silt_square(body->q[3]), s = 2 * body->q[0] * body->q[3];
@@ -109,7 +110,10 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
     for (int k = 0; k < run->bed.n_node; k++)
         if (run->bed.exposed[k])
             run->bed.fluid_node[k] = silt_nodes_add(&run->nodes, NODE_BED, k, run->bed.x[k]);
-    silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
+    if (scene->fluid.cloud)
+        SILT_TRY(silt_nodes_read(&run->nodes, scene, &run->walls, run_solid, &run->barrier, err));
+    else
+        silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
     SILT_TRY(silt_mesh_first(&run->mesh, &run->nodes, scene, &run->barrier, err));
     // nodes of the cloud that got no cell at the start are no drops: they hold no water
     silt_locator_build(&run->locator, &run->mesh, run->nodes.x, scene->fluid.size);
