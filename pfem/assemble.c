@@ -196,6 +196,27 @@ void silt_assemble_viscous_diagonal(const silt_fluid *f, const silt_mesh *mesh, 
     BY_DIM(viscous_diagonal, f, mesh, diagonal);
 }
 
+KERNEL mass_excess(const int D, const silt_fluid *f, const silt_mesh *mesh, double density, const double *a, double *out) {
+    for (int e = 0; e < f->n_cell; e++) {
+        const int *cell = mesh->cell[e];
+        double m = density * f->cell_volume[e] / ((D + 1) * (D + 2));
+        if (f->share)
+            for (int b = 0; b <= D; b++)
+                m -= density * f->cell_volume[e] * f->share[(D + 1) * e + b] / ((D + 1) * (D + 2));
+        for (int d = 0; d < D; d++) {
+            double sum = 0;
+            for (int b = 0; b <= D; b++)
+                sum += a[D * cell[b] + d];
+            for (int b = 0; b <= D; b++)
+                out[D * cell[b] + d] += m * ((D + 1) * a[D * cell[b] + d] - sum);
+        }
+    }
+}
+
+void silt_assemble_mass_excess(const silt_fluid *f, const silt_mesh *mesh, double density, const double *a, double *out) {
+    BY_DIM(mass_excess, f, mesh, density, a, out);
+}
+
 KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p) {
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];

@@ -9,6 +9,7 @@
 #include "pfem.h"
 
 typedef struct silt_pressure silt_pressure; // the pressure matrix and its factor, pressure.c
+typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
 
 /** what a step sees */
 typedef struct silt_step {
@@ -38,6 +39,7 @@ typedef struct silt_fluid {
     double *inertia;      // owned, per node, mass / (theta dt) + drag coefficient + friction
     double *w;            // owned, dim per node, the step's velocity: positions move with it
     double *star, *force, *reaction, *scratch; // owned, dim per node; reaction: force of walls, bed, bodies on the water, N
+    double *excess;       // owned, dim per node, N, force that turns the lumped mass towards the consistent one
     double *projection, *projection_weight;    // owned, pressure gradient projection (dim per node) and its weight
     double *residual, *rate, *increment;       // owned, 1 per node
     uint8_t *hold;        // owned, silt_hold
@@ -48,6 +50,7 @@ typedef struct silt_fluid {
     double *cg[3];        // owned, dim per node, momentum solver
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned
+    silt_mix *mix;        // owned
 
     // of the last step
     int iterations, momentum_iterations, pressure_iterations;
@@ -56,6 +59,7 @@ typedef struct silt_fluid {
     double dissipated;        // J, viscous
     double worked;            // J, of bodies, inlets, walls and grains on the water
     double projected;         // J, kinetic energy that making the first velocity free of divergence took
+    double impulse[3];        // N s, what that gave to the water (of walls, bed, bodies)
     double solved_volume;     // m3, sum of residual times dt
     double given_back;        // m3, volume that the debts asked for
     double momentum_residual; // N, unbalanced force on free nodes
@@ -90,6 +94,8 @@ void silt_assemble_pressure(const silt_fluid *fluid, const silt_mesh *mesh, cons
 void silt_assemble_viscous(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, double factor, double *out);
 /** diagonal += diagonal of K, its mean over the components */
 void silt_assemble_viscous_diagonal(const silt_fluid *fluid, const silt_mesh *mesh, double *diagonal);
+/** out += (lumped - consistent mass) a */
+void silt_assemble_mass_excess(const silt_fluid *fluid, const silt_mesh *mesh, double density, const double *a, double *out);
 /** residual of continuity: G^T v + L p + Q pi - source - rate; where no velocity can mend it, of its smoothing alone */
 void silt_assemble_continuity(silt_fluid *fluid, const silt_mesh *mesh, const silt_drag *drag, const double *v, const double *p);
 /** pi = -M^-1 Q^T p: the recovered pressure gradient, lumped */
@@ -113,16 +119,25 @@ typedef enum { POCKET_HELD = 0, POCKET_LITTLE, POCKET_ANY } silt_pocket;
 /** nodes that no velocity keeps at their volume take the pressure around them. @return whether there was any */
 bool silt_pockets_relent(silt_fluid *fluid, const silt_mesh *mesh, silt_pocket which, double limit, double dt, double *p);
 
+// accelerate.c -------------------------------------------------------------------------------------------
+void silt_mix_restart(silt_mix **mix); // makes it at first
+void silt_mix_free(silt_mix **mix);
+/** Mixes the corrected pressure and velocity (n and dim n numbers) with those of earlier iterates of the step.
+ * @param change    n pressure corrections of this iterate, @param residual  n, what asked for them, change . residual > 0 */
+void silt_mix_next(silt_mix *mix, int dim, int n, const double *change, const double *residual, double *pressure, double *velocity);
+
 // pressure.c ------------------------------------------------------------------------------------------
 silt_pressure *silt_pressure_create(void);
 void silt_pressure_free(silt_pressure **pressure);
 /** Assembles and factors  sum_i G_i^T P_i G_i / inertia_i + L  (consistent) or its Laplacian counterpart; where that is too
  * dear (3-D) a compact matrix like it, which then preconditions conjugate gradients.
- * Errors: SILT_FAILED when the matrix is not positive definite. */
-silt_status silt_pressure_factor(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, silt_error *err);
+ * stiff: the viscous counterpart is wanted too. Errors: SILT_FAILED when the matrix is not positive definite. */
+silt_status silt_pressure_factor(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, bool stiff, silt_error *err);
 /** increment = matrix^-1 right; iterations stop at `tolerance` relative to the right side */
 silt_status silt_pressure_solve(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, const double *right,
                                 double tolerance, double *increment, silt_error *err);
+/** increment = (3/(4 mu) M + L)^-1 right: the pressure's operator where viscosity outweighs inertia */
+silt_status silt_pressure_solve_stiff(silt_pressure *pressure, const double *right, double *increment, silt_error *err);
 /** forgets factors, so that a resumed run and one that went on hold the same */
 void silt_pressure_forget(silt_pressure *pressure);
 

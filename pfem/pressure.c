@@ -5,14 +5,19 @@
 
 #include "fluid.h"
 
-struct silt_pressure {
-    cholmod_common common;
+/** a symmetric matrix and its factor */
+typedef struct silt_system {
     cholmod_factor *factor; // owned
     cholmod_sparse *matrix; // owned, lower triangle by columns
-    cholmod_dense *solution, *work_y, *work_e; // owned
     int64_t revision;       // of the mesh that pattern and factor belong to
+    bool compact;           // neighbours only, not nodes at distance two
+} silt_system;
+
+struct silt_pressure {
+    cholmod_common common;
+    silt_system main, stiff;   // S + L or a compact stand-in; L and the mass matrix over the viscosity
+    cholmod_dense *solution, *work_y, *work_e; // owned
     int n;
-    bool compact;           // matrix and factor are those of the compact Laplacian
     double *gradient;       // owned, dim per entry, G_ij along the mesh's neighbour lists
     int *mirror;            // owned, index of (j, i) for the entry (i, j)
     int *place;             // owned, (dim + 1)^2 per cell: where (i, j) stands in the neighbour lists
@@ -44,9 +49,12 @@ silt_pressure *silt_pressure_create(void) {
 void silt_pressure_forget(silt_pressure *pressure) {
     if (!pressure)
         return;
-    cholmod_free_factor(&pressure->factor, &pressure->common);
-    cholmod_free_sparse(&pressure->matrix, &pressure->common);
-    pressure->revision = -1;
+    silt_system *both[2] = {&pressure->main, &pressure->stiff};
+    for (int k = 0; k < 2; k++) {
+        cholmod_free_factor(&both[k]->factor, &pressure->common);
+        cholmod_free_sparse(&both[k]->matrix, &pressure->common);
+        both[k]->revision = -1;
+    }
 }
 
 void silt_pressure_free(silt_pressure **pressure) {
@@ -106,7 +114,7 @@ static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
 }
 
 // lower triangle of the matrix, by columns: nodes at distance two, or neighbours only
-static void pattern_build(silt_pressure *p, const silt_mesh *mesh, int D, bool compact) {
+static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh *mesh, int D, bool compact) {
     const int n = mesh->n_node, n_entry = mesh->neighbour_start[n], m = D + 1;
     SILT_RESERVE(p->row, p->row_capacity, n + 1);
     SILT_RESERVE(p->mark, p->mark_capacity, n + 1);
@@ -125,7 +133,7 @@ static void pattern_build(silt_pressure *p, const silt_mesh *mesh, int D, bool c
     }
 
     // count, then fill
-    cholmod_free_sparse(&p->matrix, &p->common);
+    cholmod_free_sparse(&system->matrix, &p->common);
     int *start = silt_alloc((size_t)n + 1, sizeof *start);
     for (int pass = 0; pass < 2; pass++) {
         for (int j = 0; j < n; j++)
@@ -157,20 +165,19 @@ static void pattern_build(silt_pressure *p, const silt_mesh *mesh, int D, bool c
                         p->list[b + 1] = p->list[b];
                     p->list[b + 1] = key;
                 }
-                memcpy((int *)p->matrix->i + filled, p->list, (size_t)count * sizeof(int));
+                memcpy((int *)system->matrix->i + filled, p->list, (size_t)count * sizeof(int));
             }
             start[j] = filled;
             filled += count;
         }
         start[n] = filled;
         if (pass == 0)
-            p->matrix = cholmod_allocate_sparse((size_t)n, (size_t)n, (size_t)filled, 1, 1, -1, CHOLMOD_REAL, &p->common);
+            system->matrix = cholmod_allocate_sparse((size_t)n, (size_t)n, (size_t)filled, 1, 1, -1, CHOLMOD_REAL, &p->common);
     }
-    memcpy(p->matrix->p, start, ((size_t)n + 1) * sizeof *start);
+    memcpy(system->matrix->p, start, ((size_t)n + 1) * sizeof *start);
     free(start);
-    p->n = n;
-    p->compact = compact;
-    pin_closed(p, mesh);
+    system->compact = compact;
+    system->revision = mesh->revision;
 }
 
 static void gradient_assemble(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh) {
@@ -246,13 +253,61 @@ static void boundary_diagonal(silt_pressure *p, silt_fluid *f, const silt_mesh *
     }
 }
 
-silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
+static silt_status system_factor(silt_pressure *p, silt_system *system, const silt_fluid *f, const silt_step *s, bool fresh, silt_error *err) {
+    if (fresh) {
+        cholmod_free_factor(&system->factor, &p->common);
+        system->factor = cholmod_analyze(system->matrix, &p->common);
+    }
+    cholmod_factor *factor = system->factor;
+    if (!factor || !cholmod_factorize(system->matrix, factor, &p->common) || p->common.status == CHOLMOD_NOT_POSDEF) {
+        const int bad = factor ? (int)factor->minor : 0;
+        const int node = factor && factor->Perm && bad < p->n ? ((int *)factor->Perm)[bad] : 0;
+        const double *x = s->nodes->x + f->dim * node;
+        system->revision = -1;
+        return silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite near (%g, %g)", x[0], x[1]);
+    }
+    return SILT_OK;
+}
+
+// 3/(4 mu) of the lumped mass and the stabilisation: what is left of the pressure's operator when viscosity outweighs inertia
+// (3/4: a gradient field meets 4/3 mu of the deviatoric stress)
+static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
+    const silt_mesh *mesh = s->mesh;
+    silt_system *system = &p->stiff;
+    const bool fresh = system->revision != mesh->revision || !system->matrix;
+    if (fresh)
+        pattern_build(p, system, mesh, f->dim, true);
+    double *fluidity = f->scratch;
+    memset(fluidity, 0, (size_t)p->n * sizeof(double));
+    for (int e = 0; e < mesh->n_cell; e++)
+        for (int a = 0; a <= f->dim; a++)
+            fluidity[mesh->cell[e][a]] += 0.75 * f->cell_volume[e] / ((f->dim + 1) * f->mu[e]);
+    const int *start = system->matrix->p, *index = system->matrix->i;
+    double *value = system->matrix->x;
+    memset(p->row, 0, (size_t)p->n * sizeof *p->row);
+    for (int j = 0; j < p->n; j++) {
+        column_laplacian(p, f, mesh, j, false);
+        p->row[j] += mesh->wet[j] ? fluidity[j] : 1;
+        for (int k = start[j]; k < start[j + 1]; k++)
+            value[k] = p->row[index[k]];
+        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
+            p->row[mesh->neighbour[k]] = 0;
+        p->row[j] = 0;
+    }
+    return system_factor(p, system, f, s, fresh, err);
+}
+
+silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
     const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
     const bool compact = f->dim == 3 || !consistent;
-    const bool fresh = p->revision != mesh->revision || !p->matrix || p->compact != compact;
-    if (fresh)
-        pattern_build(p, mesh, f->dim, compact);
+    silt_system *system = &p->main;
+    const bool fresh = system->revision != mesh->revision || !system->matrix || system->compact != compact;
+    p->n = mesh->n_node;
+    if (fresh) {
+        pattern_build(p, system, mesh, f->dim, compact);
+        pin_closed(p, mesh);
+    }
     SILT_RESERVE(p->extra, p->extra_capacity, p->n + 1);
     memset(p->extra, 0, (size_t)p->n * sizeof *p->extra);
     if (!compact)
@@ -260,10 +315,9 @@ silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_ste
     else if (consistent)
         boundary_diagonal(p, f, mesh);
 
-    const int *start = p->matrix->p, *index = p->matrix->i;
-    double *value = p->matrix->x;
-    for (int j = 0; j < p->n; j++)
-        p->row[j] = 0;
+    const int *start = system->matrix->p, *index = system->matrix->i;
+    double *value = system->matrix->x;
+    memset(p->row, 0, (size_t)p->n * sizeof *p->row);
     for (int j = 0; j < p->n; j++) {
         if (mesh->wet[j]) {
             if (!compact)
@@ -288,26 +342,16 @@ silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_ste
             for (int m = mesh->neighbour_start[i]; !compact && m < mesh->neighbour_start[i + 1]; m++)
                 p->row[mesh->neighbour[m]] = 0;
         }
+        p->row[j] = 0;
     }
-    if (fresh) {
-        cholmod_free_factor(&p->factor, &p->common);
-        p->factor = cholmod_analyze(p->matrix, &p->common);
-        p->revision = mesh->revision;
-    }
-    if (!p->factor || !cholmod_factorize(p->matrix, p->factor, &p->common) || p->common.status == CHOLMOD_NOT_POSDEF) {
-        const int bad = p->factor ? (int)p->factor->minor : 0;
-        const int node = p->factor && p->factor->Perm && bad < p->n ? ((int *)p->factor->Perm)[bad] : 0;
-        const double *x = s->nodes->x + f->dim * node;
-        p->revision = -1;
-        return silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite near (%g, %g)", x[0], x[1]);
-    }
-    return SILT_OK;
+    SILT_TRY(system_factor(p, system, f, s, fresh, err));
+    return stiff ? factor_stiff(p, f, s, err) : SILT_OK;
 }
 
-static silt_status factor_solve(silt_pressure *p, const double *right, double *out, silt_error *err) {
+static silt_status factor_solve(silt_pressure *p, silt_system *system, const double *right, double *out, silt_error *err) {
     cholmod_dense b = {.nrow = (size_t)p->n, .ncol = 1, .nzmax = (size_t)p->n, .d = (size_t)p->n, .x = (void *)(uintptr_t)right,
                        .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
-    if (!cholmod_solve2(CHOLMOD_A, p->factor, &b, NULL, &p->solution, NULL, &p->work_y, &p->work_e, &p->common))
+    if (!cholmod_solve2(CHOLMOD_A, system->factor, &b, NULL, &p->solution, NULL, &p->work_y, &p->work_e, &p->common))
         return silt_fail(err, SILT_FAILED, "the pressure system could not be solved (CHOLMOD status %d)", p->common.status);
     memcpy(out, p->solution->x, (size_t)p->n * sizeof *out);
     return SILT_OK;
@@ -340,15 +384,15 @@ static double dot(int n, const double *a, const double *b) {
 silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step *s, const double *right, double tolerance,
                                 double *x, silt_error *err) {
     const int n = p->n;
-    if (!p->compact || s->scene->fluid.pressure != PRESSURE_CONSISTENT)
-        return factor_solve(p, right, x, err);
+    if (!p->main.compact || s->scene->fluid.pressure != PRESSURE_CONSISTENT)
+        return factor_solve(p, &p->main, right, x, err);
     for (int k = 0; k < 4; k++)
         SILT_RESERVE(p->cg[k], p->cg_capacity[k], n + 1);
     SILT_RESERVE(p->work, p->work_capacity, f->dim * n + 1);
     double *r = p->cg[0], *z = p->cg[1], *d = p->cg[2], *ad = p->cg[3];
     memcpy(r, right, (size_t)n * sizeof *r);
     memset(x, 0, (size_t)n * sizeof *x);
-    SILT_TRY(factor_solve(p, r, z, err));
+    SILT_TRY(factor_solve(p, &p->main, r, z, err));
     memcpy(d, z, (size_t)n * sizeof *d);
     double rz = dot(n, r, z);
     const double target = silt_square(tolerance) * rz;
@@ -364,7 +408,7 @@ silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step
             x[i] += alpha * d[i];
             r[i] -= alpha * ad[i];
         }
-        SILT_TRY(factor_solve(p, r, z, err));
+        SILT_TRY(factor_solve(p, &p->main, r, z, err));
         const double fresh = dot(n, r, z), beta = fresh / rz;
         for (int i = 0; i < n; i++)
             d[i] = z[i] + beta * d[i];
@@ -372,4 +416,8 @@ silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step
         f->pressure_iterations++;
     }
     return SILT_OK;
+}
+
+silt_status silt_pressure_solve_stiff(silt_pressure *p, const double *right, double *increment, silt_error *err) {
+    return factor_solve(p, &p->stiff, right, increment, err);
 }

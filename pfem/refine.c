@@ -23,6 +23,9 @@ void silt_memory_clear(silt_memory *memory) {
     free(memory->taken_area);
     free(memory->interior);
     free(memory->dead);
+    free(memory->x);
+    free(memory->group_start);
+    free(memory->exchange);
     free(memory->momentum);
     *memory = (silt_memory){0};
 }
@@ -51,8 +54,14 @@ void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nod
     memory->n_taken = 0;
     for (int e = 0; e < mesh->n_cell; e++) {
         memcpy(memory->cell[e], mesh->cell[e], sizeof memory->cell[e]);
-        memory->area[e] = cell_measure(mesh, nodes->x, mesh->cell[e]);
+        memory->area[e] = silt_cell_volume(mesh, nodes->x, e);
     }
+    const int dim = silt_nodes_dim(nodes);
+    memory->dim = dim;
+    memcpy(memory->period, mesh->period, sizeof memory->period);
+    memory->n_place = nodes->count;
+    SILT_RESERVE(memory->x, memory->place_capacity, dim * nodes->count + 1);
+    memcpy(memory->x, nodes->x, (size_t)(dim * nodes->count) * sizeof *memory->x);
     for (int i = 0; i < nodes->count; i++)
         memory->interior[i] = i < mesh->n_node && mesh->wet[i] && !mesh->surface[i];
 }

@@ -245,8 +245,10 @@ static void test_water_and_grain_together(void **unused) {
             for (int d = 0; d < 2; d++)
                 force[d] += run.fluid.mass[i] * ((run.nodes.v[2 * i + d] - old[2 * i + d]) / run.dt - scene->gravity[d]) -
                             run.fluid.reaction[2 * i + d];
-        for (int d = 0; d < 2; d++)
+        for (int d = 0; d < 2; d++) {
+            force[d] -= run.fluid.impulse[d] / run.dt;
             open[d] += force[d];
+        }
         worst = silt_max(worst, hypot(force[0], force[1]) / weight);
         OK(silt_run_move(&run, &error));
         free(old);
