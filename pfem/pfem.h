@@ -47,7 +47,7 @@ static inline double silt_node_h(const silt_nodes *nodes, int i, double size) {
 
 /** where a moving wall of the scene stands and how it moves */
 typedef struct silt_wall_motion {
-    double shift[3], angle;   // m and rad, from the place in the scene; in 3-D the angle is about the y axis
+    double shift[3], angle;   // m and rad, from the place in the scene; the angle turns from x to y, in 3-D from x to z
     double velocity[3], spin; // m/s of the centre, rad/s
     double centre[3];         // m, what it turns about, at its present place
 } silt_wall_motion;
@@ -68,33 +68,58 @@ typedef struct silt_walls {
     int (*joined)[3];            // owned, 3-D: element across the edge that starts at each corner, -1
     int n_wall;
     silt_wall_motion *motion;    // owned, one per wall of the scene
-    struct silt_wall_index *index; // owned, elements by place (wall.c)
+    int n_degenerate;            // triangles of surface files without area, left out
+    struct silt_wall_index *index; // owned, elements by place, what moves (wall.h)
 } silt_walls;
 
 /** which components of a node's velocity are held */
 typedef enum { HOLD_FREE = 0, HOLD_NORMAL, HOLD_ALL, HOLD_LINE } silt_hold; // LINE: free along one direction only
 
-void silt_walls_create(silt_walls *walls, const silt_scene *scene);
+/** Builds the walls of a scene where they stand at time 0: polylines in 2-D, boxes and surfaces from files in 3-D. Elements that
+ * meet are joined, also of different walls, but not with a wall that moves. Errors (SILT_INPUT): a surface file that cannot
+ * serve, see wall.h; the walls are empty then. */
+silt_status silt_walls_create(silt_walls *walls, const silt_scene *scene, silt_error *err);
 void silt_walls_clear(silt_walls *walls);
 /** Places the walls that move where they are at `time`; their velocities are those that carry them there from `time - dt`.
  * @param dt  s, the step that ends at `time`; 0: the velocity of that moment */
 void silt_walls_move(silt_walls *walls, const silt_scene *scene, double time, double dt);
 /** How the elements hold a node: vector is the unit normal (HOLD_NORMAL) or the free direction (HOLD_LINE) */
 silt_hold silt_walls_hold(const silt_walls *walls, const int element[3], double vector[3]);
-/** velocity of the wall's material at x, m/s: its motion and its surface velocity */
+/** Velocity of the wall's material that was at x at the start of the step, m/s: the way that it goes in the step over dt, and
+ * the surface's velocity along itself. */
 void silt_walls_velocity(const silt_walls *walls, const silt_scene *scene, int element, const double *x, double v[3]);
+/** The held part of the velocity of a node at x (start of the step): along the normal (HOLD_NORMAL), across the line (HOLD_LINE),
+ * all of it (HOLD_ALL), 0 (HOLD_FREE). A node that moves with it and any free part lands on the walls where they are now. */
+void silt_walls_given(const silt_walls *walls, const silt_scene *scene, const int element[3], const double *x, double v[3]);
+/** Normals at nodes on patches that bend: those of the water's own facets on the patch around the node, weighted with their size.
+ * With the elements' normals water would pass between nodes on two sides of a bend (Engelman, Sani and Gresho 1982). */
+typedef struct silt_wall_normals {
+    int n_row, row_capacity, normal_capacity;
+    int *row;               // owned, one per node: its row of normals, -1: the elements' normals; NULL without bent patches
+    double (*normal)[3][3]; // owned, one for each of the node's elements, unit
+} silt_wall_normals;
+struct silt_mesh;
+void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls, const silt_nodes *nodes, const struct silt_mesh *mesh);
+void silt_wall_normals_clear(silt_wall_normals *normals);
+/** silt_walls_hold and silt_walls_given in one, with those normals. @param normals  NULL: the elements' */
+silt_hold silt_walls_held(const silt_walls *walls, const silt_scene *scene, const silt_wall_normals *normals, const silt_nodes *nodes,
+                          int i, double vector[3], double given[3]);
 /** true when the nodes share a patch: a facet between them lies on the wall */
 bool silt_walls_share(const silt_walls *walls, int n, const int *const element[]);
 /** Signed distance of a point to the nearest element, positive on the water's side; *element is that element (-1: no walls,
- * distance +inf). At a vertex the side is decided by the elements that meet there. */
+ * distance +inf). At edges and vertices the side is decided by the elements that meet there; inside of a closed obstacle it
+ * is negative whatever else is near. */
 double silt_walls_distance(const silt_walls *walls, const double *point, int *element);
-/** Elements of different planes that a point touches: in 2-D up to two, in 3-D up to three (face, crease, corner).
- * @param reach    m, what counts as touching
- * @param element  out, the elements, -1 where there are fewer
- * @param on       out, 2 (3) numbers, the point put exactly onto them; x itself when there is none
- * @return how many */
+/** Elements within reach of x that turn by more than 30 degrees from each other: none, or up to as many as dimensions, the nearest
+ * first, the rest -1; on is the point that lies exactly on all of them (x itself where there is none). @return how many */
 int silt_walls_touching(const silt_walls *walls, const double *x, double reach, int element[3], double on[3]);
-/** Nodes that lie on walls: puts them exactly on, lets them turn corners, attaches what has come through or touches. */
+/** Where fixed nodes (NODE_CORNER) keep the shape of walls that point into the water: corners in 2-D, edges in 3-D with points at
+ * spacing h, bends above 30 degrees. Not where the edge lies on another wall (the foot of a gate, of a box on the floor).
+ * @return how many; *point (3 numbers each) and *element (owner first, then others, -1) are malloc'ed, owned by the caller */
+int silt_walls_ridges(const silt_walls *walls, double h, double **point, int (**element)[3]);
+/** Nodes that lie on walls, after all nodes have moved from x_old: carries fixed nodes and those on walls without slip with their
+ * walls, puts the others exactly on, lets them slide over bends and along creases, stop in corners and come free at edges,
+ * attaches what has come through a wall or touches it, fills empty creases and corners with the nearest node. */
 void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double *x_old, const uint8_t *interior, double h);
 
 // ---------------------------------------------------------------- nodes (node.c, seed.c)
@@ -132,7 +157,6 @@ double silt_size_at(const silt_size *size, const silt_scene *scene, const double
 void silt_size_free(silt_size **size);
 /** signed distance from a region, m, negative inside; dim 3: polygons are upright prisms in x-z, circles are spheres */
 double silt_region_distance(const silt_region *region, int dim, const double *x);
-void silt_region_span(const silt_region *region, int dim, double lo[3], double hi[3]); /**< its bounds, m */
 
 // ---------------------------------------------------------------- mesh (mesh.c)
 
@@ -363,6 +387,11 @@ typedef struct silt_ledger {
     double max_speed;                             // m/s, of the water's nodes
     // where volume went, cumulative, m3: solved (divergence left), moved (integration), reconnected (remeshing, nodes added and removed)
     double volume_solved, volume_moved, volume_reconnected;
+    double volume_refined; // nodes added and removed, cumulative
+    double volume_given;   // debts paid, cumulative
+    double volume_owed;    // debts of wet nodes that are still to be paid
+    double y_plus;         // distance of the wall law's sample in wall units, mean by length or area of its facets; NaN: none
+    double angular_momentum[3]; // kg m/s times m, of the water about the origin; in 2-D the last only
     // the larger of two, of the last step's solve: force on the water that its inertia does not answer, relative to weight and
     // inertia; force of the grains on the water plus force of the water on the grains, relative to what they exchange
     double momentum_error;

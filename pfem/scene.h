@@ -240,16 +240,40 @@ typedef enum {
     GAUGE_DISCHARGE,  // discharge: [[x, y], [x, y]]: m2/s through the segment, left to right
     GAUGE_BED_LEVEL,  // bed_level_at: X
     GAUGE_SCOUR,      // scour_at: X: how deep the bed lies under its level at the start
+    GAUGE_EXTENT,     // extent: x | y | z: length of connected water along that axis
+    GAUGE_FORCE,      // force_on: I: force of the water on wall I of the scene: columns NAME_x, NAME_y, NAME_z
+    GAUGE_ANGULAR,    // angular_momentum_about: [x, y]; in 3-D columns NAME_x, NAME_y, NAME_z
+    GAUGE_CENTROID,   // centroid_of: water: columns NAME_x, NAME_y, NAME_z
 } silt_gauge_kind;
 typedef struct silt_gauge_def {
     char *name; // column name(s) in history.csv
     silt_gauge_kind kind;
-    double from[3], to[3]; // place; FRONT: from[0] is +1 or -1
+    double from[3], to[3]; // place; FRONT: from[0] is +1 or -1; EXTENT: from[0] is the axis, 0 to 2
+    int index;             // FORCE: of the wall
 } silt_gauge_def;
+/** how many history columns gauge i has, and the name of its k-th one (gauge.c) */
+int silt_gauge_columns(const silt_scene *scene, int i);
+void silt_gauge_column(const silt_scene *scene, int i, int k, char name[64]);
 
 typedef enum { NORM_L2 = 1, NORM_MAX } silt_norm;
-typedef enum { SCALAR_NONE = 0, SCALAR_MAX, SCALAR_MIN, SCALAR_LAST, SCALAR_MEAN, SCALAR_PERIOD, SCALAR_SLOPE } silt_scalar;
-/** what to hold the result against: a history column against a CSV column, or a scalar of it against a value.
+typedef enum {
+    SCALAR_NONE = 0,
+    SCALAR_MAX,
+    SCALAR_MIN,
+    SCALAR_LAST,
+    SCALAR_MEAN,
+    SCALAR_PERIOD,    // mean distance of upward crossings of `level`, or of the mean
+    SCALAR_SLOPE,     // least squares
+    SCALAR_AT,        // the ordinate at abscissa `at`
+    SCALAR_REACHES,   // the first abscissa where the ordinate passes `level`
+    SCALAR_AMPLITUDE, // half of the largest less the smallest
+    SCALAR_DECAY,     // rate at which the heights of successive half waves fall
+} silt_scalar;
+/** what a check looks at */
+typedef enum { CHECK_COLUMN = 1, CHECK_PROFILE } silt_check_kind;
+/** what a profile shows along a line */
+typedef enum { PROFILE_SURFACE = 1, PROFILE_VELOCITY_X, PROFILE_VELOCITY_Y, PROFILE_VELOCITY_Z, PROFILE_SPEED, PROFILE_PRESSURE } silt_profile;
+/** what to hold the result against: a history column or a profile against a CSV column, or a scalar of the column against a value.
  * The history's abscissa is time_scale * (time + time_shift), its ordinate scale * (column + shift). */
 typedef struct silt_check_def {
     char *name;
@@ -267,6 +291,13 @@ typedef struct silt_check_def {
     silt_scalar scalar; // scalar: max | min | last | mean | period | slope
     double value;       // expected scalar
     double low, high;   // or the allowed range instead of value and tolerance; NaN when not given
+    silt_check_kind kind;
+    // a profile: along the line at a time of the frames; abscissa place_scale * (distance from the line's start + place_shift)
+    silt_profile profile;
+    double line[6];     // m, two points; equal: the x axis
+    double place_scale, place_shift;
+    double at;          // s, time of the profile; abscissa of SCALAR_AT
+    double level;       // ordinate of SCALAR_REACHES and SCALAR_PERIOD; NaN: the mean
     double tolerance;   // relative to |value|, absolute when value is 0
 } silt_check_def;
 

@@ -443,6 +443,13 @@ static const char *const check_fixed[] = {"step",
                                           "volume_solved",
                                           "volume_moved",
                                           "volume_reconnected",
+                                          "volume_refined",
+                                          "volume_given",
+                                          "volume_owed",
+                                          "y_plus",
+                                          "angular_momentum_x",
+                                          "angular_momentum_y",
+                                          "angular_momentum_z",
                                           "bed_mass",
                                           "released_mass",
                                           "deposited_mass",
@@ -498,12 +505,10 @@ static check_column *check_columns(const silt_scene *scene, int *count) {
             snprintf(column[n++].name, sizeof column->name, "%.40s_%s", scene->body[i].name, check_of_body[k]);
         }
     for (int i = 0; i < scene->n_gauge; i++)
-        for (int k = 0; k < (scene->gauge[i].kind == GAUGE_VELOCITY ? 3 : 1) && scene->gauge[i].name; k++) {
+        for (int k = 0; k < silt_gauge_columns(scene, i) && scene->gauge[i].name; k++) {
             SILT_RESERVE(column, capacity, n + 1);
             column[n].owner = scene->n_body + i;
-            const char *ending = scene->gauge[i].kind == GAUGE_VELOCITY ? check_of_body[k] : NULL;
-            snprintf(column[n++].name, sizeof column->name, "%.40s%s%s", scene->gauge[i].name, ending ? "_" : "",
-                     ending ? ending : "");
+            silt_gauge_column(scene, i, k, column[n++].name);
         }
     qsort(column, (size_t)n, sizeof *column, check_column_order);
     *count = n;
@@ -574,7 +579,7 @@ static void check_target(silt_reader *reader, const silt_scene *scene, int i, co
     if (gauge) {
         for (int k = 0; k < scene->n_gauge; k++)
             if (scene->gauge[k].name && strcmp(scene->gauge[k].name, check->column) == 0) {
-                if (scene->gauge[k].kind == GAUGE_VELOCITY)
+                if (silt_gauge_columns(scene, k) == 3)
                     silt_complain(reader, gauge,
                                   "key 'checks.%d.gauge': found '%s', which has three columns, allowed column: "
                                   "%s_x, %s_y or %s_z",
@@ -628,6 +633,26 @@ static void check_reference(silt_reader *reader, silt_check_def *check, int i, c
     silt_series_clear(&table);
 }
 
+// what a check needs besides: the abscissa of a scalar, the time of a profile, the line of a field
+static void check_places(silt_reader *reader, const silt_scene *scene, int i, const silt_tree *node) {
+    const silt_check_def *check = &scene->check[i];
+    const bool profile = check->kind == CHECK_PROFILE;
+    if ((profile || check->scalar == SCALAR_AT) && isnan(check->at))
+        silt_complain(reader, node, "key 'checks.%d.at': found nothing in this block, allowed a number: %s", i,
+                      profile ? "the time of the profile in s" : "where the scalar is taken");
+    if (check->scalar == SCALAR_REACHES && isnan(check->level))
+        silt_complain(reader, node,
+                      "key 'checks.%d.level': found nothing in this block, allowed a number: what the scalar waits for",
+                      i);
+    if (profile && check->profile > PROFILE_SURFACE && !silt_tree_item(node, "line"))
+        silt_complain(reader, node,
+                      "key 'checks.%d.line': found nothing in this block, allowed two different points: "
+                      "where the profile is taken",
+                      i);
+    if (profile && check->profile && !check->reference)
+        silt_complain(reader, node, "key 'checks.%d.reference': found nothing in this block, allowed a CSV file", i);
+}
+
 // each check has one target, one thing to hold it against, and a tolerance
 static void check_checks(silt_reader *reader, silt_scene *scene, const check_column *column, int n) {
     for (int i = 0; i < scene->n_check; i++) {
@@ -636,10 +661,12 @@ static void check_checks(silt_reader *reader, silt_scene *scene, const check_col
         if (!node || node->kind != TREE_MAPPING)
             continue;
         check_target(reader, scene, i, column, n);
+        check_places(reader, scene, i, node);
         const silt_tree *reference = silt_tree_item(node, "reference"), *scalar = silt_tree_item(node, "scalar");
         const silt_tree *value = silt_tree_item(node, "value"), *range = silt_tree_item(node, "range");
         bool is_scalar = check->scalar != SCALAR_NONE;
-        if (!reference && (!scalar || strcmp(scalar->text ? scalar->text : "", "none") == 0))
+        if (check->kind != CHECK_PROFILE && !reference &&
+            (!scalar || strcmp(scalar->text ? scalar->text : "", "none") == 0))
             silt_complain(reader, node, "key 'checks.%d': found neither a reference nor a scalar, allowed one of them",
                           i);
         else if (reference && is_scalar)
@@ -668,6 +695,21 @@ static void check_checks(silt_reader *reader, silt_scene *scene, const check_col
     }
 }
 
+// gauges that need a wall, or an axis of space
+static void check_gauges(silt_reader *reader, const silt_scene *scene) {
+    for (int i = 0; i < scene->n_gauge; i++) {
+        const silt_gauge_def *gauge = &scene->gauge[i];
+        const silt_tree *node = silt_tree_find(reader->root, "gauges.%d", i);
+        if (gauge->kind == GAUGE_FORCE && gauge->index >= scene->n_wall)
+            silt_complain(reader, silt_tree_item(node, "force_on"),
+                          "key 'gauges.%d.force_on': found %d, allowed the number of a wall, the first is 0; there are %d", i,
+                          gauge->index, scene->n_wall);
+        if (gauge->kind == GAUGE_EXTENT && gauge->from[0] == 2 && scene->dimension != 3)
+            silt_complain(reader, silt_tree_item(node, "extent"),
+                          "key 'gauges.%d.extent': found z, allowed x or y in two dimensions", i);
+    }
+}
+
 void silt_scene_check(silt_reader *reader, silt_scene *scene) {
     check_blocks(reader, scene);
     check_time(reader, scene);
@@ -676,6 +718,7 @@ void silt_scene_check(silt_reader *reader, silt_scene *scene) {
     check_inside(reader, scene);
     check_period(reader, scene);
     check_bodies(reader, scene);
+    check_gauges(reader, scene);
     int n;
     check_column *column = check_columns(scene, &n);
     check_names(reader, scene, column, n);

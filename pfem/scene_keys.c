@@ -41,9 +41,27 @@ static const silt_word shape_words[] = {
 static const silt_word motion_words[] = {{"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {0}};
 static const silt_word front_words[] = {{"x", 1}, {"-x", -1}, {0}};
 static const silt_word norm_words[] = {{"l2", NORM_L2}, {"max", NORM_MAX}, {0}};
-static const silt_word scalar_words[] = {
-    {"none", SCALAR_NONE}, {"max", SCALAR_MAX},       {"min", SCALAR_MIN},     {"last", SCALAR_LAST},
-    {"mean", SCALAR_MEAN}, {"period", SCALAR_PERIOD}, {"slope", SCALAR_SLOPE}, {0}};
+static const silt_word scalar_words[] = {{"none", SCALAR_NONE},
+                                         {"max", SCALAR_MAX},
+                                         {"min", SCALAR_MIN},
+                                         {"last", SCALAR_LAST},
+                                         {"mean", SCALAR_MEAN},
+                                         {"period", SCALAR_PERIOD},
+                                         {"slope", SCALAR_SLOPE},
+                                         {"at", SCALAR_AT},
+                                         {"reaches", SCALAR_REACHES},
+                                         {"amplitude", SCALAR_AMPLITUDE},
+                                         {"decay", SCALAR_DECAY},
+                                         {0}};
+static const silt_word extent_words[] = {{"x", 0}, {"y", 1}, {"z", 2}, {0}};
+static const silt_word water_words[] = {{"water", 1}, {0}};
+static const silt_word check_profile_words[] = {{"surface", PROFILE_SURFACE},
+                                          {"velocity_x", PROFILE_VELOCITY_X},
+                                          {"velocity_y", PROFILE_VELOCITY_Y},
+                                          {"velocity_z", PROFILE_VELOCITY_Z},
+                                          {"speed", PROFILE_SPEED},
+                                          {"pressure", PROFILE_PRESSURE},
+                                          {0}};
 static const silt_word formula_words[] = {{"uniform", FORMULA_UNIFORM},
                                           {"solid-rotation", FORMULA_SOLID_ROTATION},
                                           {"shear", FORMULA_SHEAR},
@@ -415,6 +433,16 @@ static const silt_key gauge_rows[] = {
      AT(silt_gauge_def, from), .doc = "height of the bed at this x"},
     {"scour_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_SCOUR,
      AT(silt_gauge_def, from), .doc = "how deep the bed lies under its level at the start, at this x"},
+    {"extent", KEY_SIGN, .flags = KEY_CHOICE, .words = extent_words, .select = GAUGE_EXTENT, AT(silt_gauge_def, from),
+     .doc = "length of connected water along this axis, m"},
+    {"force_on", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(0, INT32_MAX), .select = GAUGE_FORCE,
+     AT(silt_gauge_def, index),
+     .doc = "force of the water on this wall of the list, from 0; columns NAME_x, NAME_y, NAME_z, N"},
+    {"angular_momentum_about", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_ANGULAR,
+     AT(silt_gauge_def, from),
+     .doc = "of the water about this point, kg m2/s; in three dimensions columns NAME_x, NAME_y, NAME_z"},
+    {"centroid_of", KEY_SIGN, .flags = KEY_CHOICE, .words = water_words, .select = GAUGE_CENTROID,
+     AT(silt_gauge_def, from), .doc = "centre of mass of the water, columns NAME_x, NAME_y, NAME_z, m"},
     {0}};
 TABLE(gauge, "a gauge", silt_gauge_def, offsetof(silt_gauge_def, kind));
 
@@ -426,8 +454,13 @@ TABLE(where, "a row filter", silt_check_def, -1);
 
 static const silt_key check_rows[] = {
     {"name", KEY_NAME, AT(silt_check_def, name), .doc = "for the report"},
-    {"gauge", KEY_TEXT, .flags = KEY_CHOICE | KEY_SHORTHAND, AT(silt_check_def, column), .doc = "a gauge of the scene"},
-    {"column", KEY_TEXT, .flags = KEY_CHOICE, AT(silt_check_def, column), .doc = "a column of history.csv"},
+    {"gauge", KEY_TEXT, .flags = KEY_CHOICE | KEY_SHORTHAND, .select = CHECK_COLUMN, AT(silt_check_def, column),
+     .doc = "a gauge of the scene"},
+    {"column", KEY_TEXT, .flags = KEY_CHOICE, .select = CHECK_COLUMN, AT(silt_check_def, column),
+     .doc = "a column of history.csv"},
+    {"profile", KEY_WORD, .flags = KEY_CHOICE, .select = CHECK_PROFILE, .words = check_profile_words,
+     AT(silt_check_def, profile),
+     .doc = "along a line at the time `at`, from the frames; the surface is the top of connected water"},
     {"reference", KEY_FILE, .flags = KEY_OPTIONAL, AT(silt_check_def, reference), .doc = "CSV file beside the scene"},
     {"x", KEY_TEXT, .flags = KEY_OPTIONAL, AT(silt_check_def, x),
      .doc = "abscissa in the reference; default its first column"},
@@ -435,12 +468,20 @@ static const silt_key check_rows[] = {
      .doc = "ordinate in the reference; default its second column"},
     {"where", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &where_table, .presence = PRESENT_TEXT,
      .present = offsetof(silt_check_def, where_column), .doc = "which rows of the reference count; default all"},
-    {"time_scale", KEY_NUMBER, .fallback = "1", AT(silt_check_def, time_scale),
+    {"time_scale", KEY_NUMBER, .fallback = "1", .when = ONLY(CHECK_COLUMN), AT(silt_check_def, time_scale),
      .doc = "the abscissa is time_scale (time + time_shift)"},
-    {"time_shift", KEY_NUMBER, .unit = "s", .fallback = "0", AT(silt_check_def, time_shift), .doc = "see time_scale"},
-    {"scale", KEY_NUMBER, .fallback = "1", AT(silt_check_def, scale), .doc = "the ordinate is scale (column + shift)"},
+    {"time_shift", KEY_NUMBER, .unit = "s", .fallback = "0", .when = ONLY(CHECK_COLUMN), AT(silt_check_def, time_shift),
+     .doc = "see time_scale"},
+    {"place_scale", KEY_NUMBER, .fallback = "1", .when = ONLY(CHECK_PROFILE), AT(silt_check_def, place_scale),
+     .doc = "the abscissa is place_scale (place + place_shift)"},
+    {"place_shift", KEY_NUMBER, .unit = "m", .fallback = "0", .when = ONLY(CHECK_PROFILE),
+     AT(silt_check_def, place_shift), .doc = "see place_scale"},
+    {"line", KEY_SEGMENT, .unit = "m", .flags = KEY_OPTIONAL, .when = ONLY(CHECK_PROFILE), AT(silt_check_def, line),
+     .doc = "the place is the distance from its start; a surface is taken above it; default the x axis"},
+    {"scale", KEY_NUMBER, .fallback = "1", AT(silt_check_def, scale),
+     .doc = "the ordinate is scale (column + shift), or scale (profile + shift)"},
     {"shift", KEY_NUMBER, .fallback = "0", AT(silt_check_def, shift), .doc = "see scale"},
-    {"align", KEY_NUMBER, .fallback = ".nan", AT(silt_check_def, align),
+    {"align", KEY_NUMBER, .fallback = ".nan", .when = ONLY(CHECK_COLUMN), AT(silt_check_def, align),
      .doc = "the curve is shifted in time so that both have this ordinate at the same abscissa"},
     {"window", KEY_PAIR, .fallback = "[-.inf, .inf]", .flags = KEY_INFINITE, AT(silt_check_def, window),
      .doc = "part of the abscissa that counts"},
@@ -449,15 +490,19 @@ static const silt_key check_rows[] = {
     {"norm", KEY_WORD, .fallback = "l2", .words = norm_words, AT(silt_check_def, norm), .doc = "of the difference"},
     {"relative_to", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_check_def, relative_to),
      .doc = "what the difference is divided by; 0: the reference, point by point"},
-    {"scalar", KEY_WORD, .fallback = "none", .words = scalar_words, AT(silt_check_def, scalar),
-     .doc = "a number made of the column instead of a reference"},
+    {"scalar", KEY_WORD, .fallback = "none", .words = scalar_words, .when = ONLY(CHECK_COLUMN),
+     AT(silt_check_def, scalar), .doc = "a number made of the column instead of a reference"},
+    {"at", KEY_NUMBER, .fallback = ".nan", AT(silt_check_def, at),
+     .doc = "abscissa of the scalar `at`; time of a profile in s, between frames linear"},
+    {"level", KEY_NUMBER, .fallback = ".nan", .when = ONLY(CHECK_COLUMN), AT(silt_check_def, level),
+     .doc = "ordinate that the scalar `reaches` waits for, or that `period` counts crossings of (default the mean)"},
     {"value", KEY_NUMBER, .fallback = ".nan", AT(silt_check_def, value), .doc = "expected scalar"},
     {"range", KEY_PAIR, .fallback = ".nan", .flags = KEY_INFINITE, AT(silt_check_def, low),
      .doc = "allowed scalar, instead of value and tolerance"},
     {"tolerance", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_check_def, tolerance),
      .doc = "of the norm, or of the scalar relative to its value (absolute when that is 0)"},
     {0}};
-TABLE(check, "a check", silt_check_def, -1);
+TABLE(check, "a check", silt_check_def, offsetof(silt_check_def, kind));
 
 static const silt_key scene_rows[] = {
     {"silt", KEY_INTEGER, RANGE(1, 1), AT(silt_scene, version), .doc = "version of these keys"},
@@ -493,5 +538,6 @@ _Static_assert(offsetof(silt_region, hi) == offsetof(silt_region, lo) + 3 * size
 _Static_assert(offsetof(silt_wall, hi) == offsetof(silt_wall, lo) + 3 * sizeof(double), "box: lo, hi");
 _Static_assert(offsetof(silt_gauge_def, to) == offsetof(silt_gauge_def, from) + 3 * sizeof(double),
                "segment: from, to");
+_Static_assert(sizeof(silt_check_kind) == sizeof(int), "selectors are stored as int");
 _Static_assert(offsetof(silt_check_def, high) == offsetof(silt_check_def, low) + sizeof(double), "pair: low, high");
 _Static_assert(sizeof(silt_shape) == sizeof(int), "words are stored as int");

@@ -97,6 +97,8 @@ static bool write_counts(const silt_key_table *table, const silt_key *key, const
     switch (key->kind) {
     case KEY_NUMBER:
         return !isnan(*(const double *)at);
+    case KEY_SEGMENT:
+        return memcmp(at, (const char *)at + 3 * sizeof(double), 3 * sizeof(double)) != 0;
     case KEY_PAIR:
         return ((const double *)at)[0] < ((const double *)at)[1];
     case KEY_TEXT:

@@ -77,29 +77,6 @@ static void seed_wrap(const seed *s, double *x) {
         x[0] = s->scene->period[0];
 }
 
-int silt_walls_touching(const silt_walls *walls, const double *x, double reach, int element[3], double on[3]) {
-    element[0] = element[1] = element[2] = -1;
-    memcpy(on, x, 2 * sizeof *on);
-    for (int k = 0; k < walls->count; k++) {
-        const double *a = walls->from[k], *b = walls->to[k], *n = walls->normal[k];
-        const double dx = b[0] - a[0], dy = b[1] - a[1], length = hypot(dx, dy);
-        const double along = ((x[0] - a[0]) * dx + (x[1] - a[1]) * dy) / length;
-        const double off = (x[0] - a[0]) * n[0] + (x[1] - a[1]) * n[1];
-        if (fabs(off) > reach || along < -reach || along > length + reach)
-            continue;
-        if (element[0] < 0)
-            element[0] = k;
-        else if (element[1] < 0 && fabs(walls->normal[element[0]][0] * n[1] - walls->normal[element[0]][1] * n[0]) > 0.3)
-            element[1] = k; // nearly straight joints hold nothing
-        if (along < reach || along > length - reach)
-            memcpy(on, along < reach ? a : b, 2 * sizeof *on);
-        else
-            for (int d = 0; d < 2; d++)
-                on[d] = a[d] + along * (b[d] - a[d]) / length;
-    }
-    return (element[0] >= 0) + (element[1] >= 0);
-}
-
 // a node on the tank's wall knows its elements; closer than a thousandth of h counts as on
 void seed_water(seed *s, const double *x, double gap, double margin) {
     double on[3] = {0}, at[3] = {0};
@@ -148,12 +125,6 @@ static int seed_outline(const silt_region *region, double h, double **xy) {
     return count;
 }
 
-// a place is water when it lies in a region, of the plane or of space
-static bool seed_in(const seed *s, int r, const double *x) {
-    const silt_region *region = &s->scene->fluid.region[r];
-    return s->dim == 3 ? silt_region_distance(region, 3, x) <= 0 : silt_region_contains(region, x);
-}
-
 // a place a little off in direction k of 8 (14 in space)
 static void seed_probe(const seed *s, const double *x, int k, double angle, double probe[3]) {
     static const double corner[14][3] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},   {0, -1, 0}, {0, 0, 1},   {0, 0, -1},  {1, 1, 1},
@@ -176,7 +147,7 @@ static bool seed_inside_other(const seed *s, int region, const double *x) {
         for (int k = 0; k < (s->dim == 3 ? 14 : 8) && all; k++) {
             double probe[3];
             seed_probe(s, x, k, 0, probe);
-            all = seed_in(s, r, probe);
+            all = silt_region_contains(&s->scene->fluid.region[r], probe);
         }
         if (all)
             return true;
@@ -191,7 +162,7 @@ static bool seed_inside_union(const seed *s, const double *x) {
         seed_probe(s, x, k, 0.37, probe);
         bool in = false;
         for (int r = 0; r < s->scene->fluid.n_region && !in; r++)
-            in = seed_in(s, r, probe);
+            in = silt_region_contains(&s->scene->fluid.region[r], probe);
         if (!in)
             return false;
     }
@@ -256,15 +227,21 @@ static void seed_inlets(seed *s) {
 
 // corners of the tank that point into the water
 static void seed_corners(seed *s) {
-    const silt_walls *walls = s->walls;
-    for (int a = 0; a < walls->count && s->dim == 2; a++) {
-        const int b = walls->next[a];
-        if (b < 0)
-            continue;
-        const double sine = walls->normal[a][0] * walls->normal[b][1] - walls->normal[a][1] * walls->normal[b][0];
-        if (sine < -1e-3 && !seed_crowded(s, walls->to[a], 1e-6 * s->h))
-            seed_add(s, NODE_CORNER, a, walls->to[a]);
-    }
+    double *point, finest = s->h;
+    int(*element)[3];
+    for (int r = 0; r < s->scene->fluid.n_size; r++)
+        finest = silt_min(finest, s->scene->fluid.size_at[r].size);
+    const int n = silt_walls_ridges(s->walls, finest, &point, &element);
+    // corners in any case, along edges what the size field leaves
+    for (int pass = 0; pass < 2; pass++)
+        for (int k = 0; k < n; k++) {
+            const double *x = point + 3 * k;
+            const bool corner = element[k][2] >= 0 || s->dim == 2 || !s->size;
+            if (corner == (pass == 0) && !seed_crowded(s, x, corner ? 1e-6 * s->h : 0.75 * seed_h(s, x)))
+                seed_add(s, NODE_CORNER, element[k][0], x);
+        }
+    free(point);
+    free(element);
 }
 
 // bins over everything that may be seeded; finest: the smallest distance
@@ -282,7 +259,7 @@ static bool seed_start(seed *s, silt_nodes *nodes, const silt_scene *scene, cons
     }
     for (int r = 0; r < fluid->n_region; r++) {
         double lo[3], hi[3];
-        silt_region_span(&fluid->region[r], s->dim, lo, hi);
+        silt_region_bounds(&fluid->region[r], lo, hi);
         for (int d = 0; d < s->dim; d++) {
             s->lo[d] = silt_min(s->lo[d], lo[d]);
             s->hi[d] = silt_max(s->hi[d], hi[d]);

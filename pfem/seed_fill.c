@@ -479,7 +479,7 @@ int seed_outline_samples(const seed *s, int r, double spacing, double **out) {
         seed_part face = {.region = r, .kind = PART_FACE};
         part_plane(&face, corners, corner);
         double lo[3], hi[3];
-        silt_region_span(&face.flat, 2, lo, hi);
+        silt_region_bounds(&face.flat, lo, hi);
         const int nu = (int)silt_max(1, ceil((hi[0] - lo[0]) / spacing)), nv = (int)silt_max(1, ceil((hi[1] - lo[1]) / spacing));
         for (int i = 0; i <= nu; i++)
             for (int j = 0; j <= nv; j++) {

@@ -69,24 +69,6 @@ double silt_region_distance(const silt_region *region, int dim, const double *x)
     return sqrt(square) - region->radius;
 }
 
-void silt_region_span(const silt_region *region, int dim, double lo[3], double hi[3]) {
-    for (int d = 0; d < 3; d++) {
-        lo[d] = d < dim && region->kind >= REGION_CIRCLE ? region->centre[d] - region->radius : region->lo[d];
-        hi[d] = d < dim && region->kind >= REGION_CIRCLE ? region->centre[d] + region->radius : region->hi[d];
-    }
-    if (region->kind != REGION_POLYGON)
-        return;
-    for (int c = 0; c < 2; c++) {
-        const int d = c ? dim - 1 : 0;
-        lo[d] = HUGE_VAL;
-        hi[d] = -HUGE_VAL;
-        for (int k = 0; k < region->n_point; k++) {
-            lo[d] = silt_min(lo[d], region->point[3 * k + c]);
-            hi[d] = silt_max(hi[d], region->point[3 * k + c]);
-        }
-    }
-}
-
 void silt_size_create(silt_size **size, const silt_scene *scene, const silt_walls *walls) {
     const silt_fluid_def *fluid = &scene->fluid;
     *size = NULL;
@@ -103,7 +85,7 @@ void silt_size_create(silt_size **size, const silt_scene *scene, const silt_wall
     for (int r = 0; r < fluid->n_size; r++) {
         const silt_size_def *rule = &fluid->size_at[r];
         if (rule->near == NEAR_REGION)
-            silt_region_span(&rule->region, s->dim, s->lo[r], s->hi[r]);
+            silt_region_bounds(&rule->region, s->lo[r], s->hi[r]);
         else { // a fine rule may stand against the coarsest one, a coarse one only against fluid.size
             const double against = rule->size > s->base ? s->base : coarsest;
             s->reach[rule->near] = silt_max(s->reach[rule->near], rule->distance + fabs(against - rule->size) / s->growth);
