@@ -6,9 +6,11 @@
 #define FILL_RIM 0.5      // times h: nodes inside keep that distance from their rim
 #define FILL_RATE 0.2     // of the bubbles' force, times h, in a sweep
 #define FILL_STEP 0.15    // times h: longest way in a sweep
-#define FILL_MEET 0.55    // times h: of two nodes that are closer one goes
-static const double fill_gap[3] = {0.85, 0.75, 0.7}; // times h: room for a node in each round of growing
-static const int fill_sweeps = 30;                   // after each round
+#define FILL_MEET 0.65    // times h: of two nodes that are closer one goes
+#define FILL_SPIRAL 40
+#define FILL_ROUNDS 4
+static const double fill_gap[FILL_ROUNDS] = {0.85, 0.75, 0.75, 0.75}; // times h: room for a node in each round of growing
+static const int fill_sweeps[FILL_ROUNDS] = {30, 30, 30, 10};         // after it
 
 // ---- edges
 
@@ -97,8 +99,17 @@ static double part_onto(const seed *s, const seed_part *p, double *x) {
 }
 
 // Directions in which neighbours are looked for. In a plane six, turned so that one points to the nearest node; inside a
-// volume those of the body-centred lattice. Lengths times h. @return how many
-static int part_directions(const seed *s, const seed_part *p, const double *x, double direction[14][3]) {
+// volume those of the body-centred lattice; more for what that left open. Lengths times h. @return how many
+static int part_directions(const seed *s, const seed_part *p, const double *x, bool open, double direction[FILL_SPIRAL][3]) {
+    if (p->kind == PART_INSIDE && s->dim == 3 && open) {
+        for (int k = 0; k < FILL_SPIRAL; k++) {
+            const double z = 1 - (2 * k + 1.0) / FILL_SPIRAL, flat = sqrt(1 - z * z), angle = M_PI * (3 - sqrt(5)) * k;
+            direction[k][0] = flat * cos(angle);
+            direction[k][1] = flat * sin(angle);
+            direction[k][2] = z;
+        }
+        return FILL_SPIRAL;
+    }
     if (p->kind == PART_INSIDE && s->dim == 3) {
         const double side = FILL_LATTICE;
         int n = 0;
@@ -140,10 +151,11 @@ static int part_directions(const seed *s, const seed_part *p, const double *x, d
             phase = atan2(across, along);
         }
     }
-    for (int k = 0; k < 6; k++)
+    const int n = open ? 18 : 6;
+    for (int k = 0; k < n; k++)
         for (int d = 0; d < 3; d++)
-            direction[k][d] = cos(phase + k * M_PI / 3) * u[d] + sin(phase + k * M_PI / 3) * v[d];
-    return 6;
+            direction[k][d] = cos(phase + 2 * M_PI * k / n) * u[d] + sin(phase + 2 * M_PI * k / n) * v[d];
+    return n;
 }
 
 // true when a node may stand here
@@ -168,7 +180,7 @@ static bool part_add(seed *s, const seed_part *p, const double *x) {
 // ---- growing and relaxing
 
 // the part grows from its rim: every node in turn looks for neighbours at the local distance
-static void part_grow(seed *s, const seed_part *p, int first, double gap) {
+static void part_grow(seed *s, const seed_part *p, int first, double gap, bool open) {
     silt_nodes *nodes = s->nodes;
     int *queue = NULL, n = 0, capacity = 0;
     for (int i = 0; i < nodes->count; i++) {
@@ -181,12 +193,17 @@ static void part_grow(seed *s, const seed_part *p, int first, double gap) {
         queue[n++] = i;
     }
     for (int q = 0; q < n; q++) {
-        double x[3] = {0}, direction[14][3];
+        double x[3] = {0}, direction[FILL_SPIRAL][3];
         memcpy(x, nodes->x + s->dim * queue[q], (size_t)s->dim * sizeof *x);
-        const int n_direction = part_directions(s, p, x, direction);
+        const int n_direction = part_directions(s, p, x, open, direction);
+        const double h_own = seed_h(s, x);
         for (int k = 0; k < n_direction; k++) {
-            double y[3], h = seed_h(s, x);
-            for (int pass = 0; pass < 2; pass++) { // at the distance that is wanted half way
+            double y[3], h = h_own;
+            for (int d = 0; d < 3; d++)
+                y[d] = x[d] + h * direction[k][d];
+            if (seed_crowded(s, y, 0.6 * gap * h)) // the cheap question first
+                continue;
+            for (int pass = 0; pass < 2 && s->size; pass++) { // at the distance that is wanted half way
                 for (int d = 0; d < 3; d++)
                     y[d] = x[d] + 0.5 * h * direction[k][d];
                 h = seed_h(s, y);
@@ -213,15 +230,18 @@ static void part_relax(seed *s, const seed_part *p, int first, int sweeps) {
     silt_nodes *nodes = s->nodes;
     const int dim = s->dim;
     double *x = silt_alloc((size_t)(dim * nodes->count) + 1, sizeof *x);
+    double *size = silt_alloc((size_t)nodes->count + 1, sizeof *size);
     for (int sweep = 0; sweep < sweeps; sweep++) {
+        for (int i = sweep ? first : 0; i < nodes->count && sweep % 5 == 0; i++)
+            size[i] = seed_h(s, nodes->x + dim * i);
         for (int i = first; i < nodes->count; i++) {
-            const double *at = nodes->x + dim * i, h = seed_h(s, at);
+            const double *at = nodes->x + dim * i, h = size[i];
             double force[3] = {0}, to[3] = {0};
             int list[160];
             const int n = seed_near(s, at, 1.6 * h, 160, list);
             for (int k = 0; k < n; k++) {
                 const double *y = nodes->x + dim * list[k], apart = seed_apart(s, at, y);
-                const double l = apart / (s->size ? 0.5 * (h + seed_h(s, y)) : h);
+                const double l = apart / (0.5 * (h + size[list[k]]));
                 if (list[k] == i || l >= 1.5 || apart == 0)
                     continue;
                 const double f = 1.25 * l * l * l - 2.375 * l * l + 1.125;
@@ -232,8 +252,8 @@ static void part_relax(seed *s, const seed_part *p, int first, int sweeps) {
                     force[d] += f * step / apart;
                 }
             }
-            const double size = FILL_RATE * silt_length(dim, force);
-            const double rate = FILL_RATE * h * (size > FILL_STEP ? FILL_STEP / size : 1);
+            const double way = FILL_RATE * silt_length(dim, force);
+            const double rate = FILL_RATE * h * (way > FILL_STEP ? FILL_STEP / way : 1);
             for (int d = 0; d < dim; d++)
                 to[d] = at[d] + rate * force[d];
             part_onto(s, p, to);
@@ -244,6 +264,7 @@ static void part_relax(seed *s, const seed_part *p, int first, int sweeps) {
         memcpy(nodes->x + dim * first, x + dim * first, (size_t)(dim * (nodes->count - first)) * sizeof *x);
         seed_sort(s);
     }
+    free(size);
     free(x);
 }
 
@@ -267,10 +288,11 @@ static void part_thin(seed *s, int first) {
 
 static void part_fill(seed *s, const seed_part *p) {
     const int first = s->nodes->count;
-    for (int round = 0; round < 3; round++) {
-        part_grow(s, p, first, fill_gap[round]);
-        part_relax(s, p, first, fill_sweeps);
-        part_thin(s, first);
+    for (int round = 0; round < FILL_ROUNDS; round++) {
+        part_grow(s, p, first, fill_gap[round], round > 0);
+        part_relax(s, p, first, fill_sweeps[round]);
+        if (round < FILL_ROUNDS - 1)
+            part_thin(s, first);
     }
     if (p->kind == PART_INSIDE)
         return;
