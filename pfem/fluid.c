@@ -86,7 +86,7 @@ static void fluid_reserve(silt_fluid *f, int n_node, int n_cell) {
 // which velocity components the surroundings hold
 static void hold_nodes(silt_fluid *f, const silt_scene *scene, const silt_walls *walls, const silt_nodes *nodes,
                        const silt_mesh *mesh) {
-    silt_wall_normals_take(&f->wall_normals, walls, nodes, mesh);
+    silt_wall_normals_take(&f->wall_normals, walls, nodes, mesh, nodes->x);
     for (int i = 0; i < f->n_node; i++) {
         f->hold[i] = nodes->kind[i] == NODE_FLUID ? 0 : 2;
         f->normal[2 * i] = f->normal[2 * i + 1] = 0;
@@ -247,6 +247,17 @@ static void midpoint(silt_fluid *f, const silt_scene *scene, const silt_nodes *n
     const double rho = scene->fluid.density, mu = scene->fluid.viscosity, theta_dt = scene->fluid.theta * dt;
     for (int i = 0; i < 2 * f->n_node; i++)
         f->x_mid[i] = nodes->x[i] + 0.5 * dt * f->w[i];
+    // on bent walls the normals are those of this mesh's facets, else a full tank cannot keep its volume
+    if (f->wall_normals.n_row) {
+        silt_wall_normals_take(&f->wall_normals, f->walls, nodes, mesh, f->x_mid);
+        for (int i = 0; i < f->n_node; i++)
+            if (f->hold[i] == 1 && nodes->kind[i] == NODE_FLUID && f->wall_normals.row[i] >= 0) {
+                double vector[3], given[3];
+                silt_walls_held(f->walls, scene, &f->wall_normals, nodes, i, vector, given);
+                memcpy(f->normal + 2 * i, vector, 2 * sizeof(double));
+                memcpy(f->given + 2 * i, given, 2 * sizeof(double));
+            }
+    }
     for (int i = 0; i < f->n_node; i++)
         f->mass[i] = f->volume[i] = 0;
     for (int e = 0; e < f->n_cell; e++) {
@@ -456,6 +467,25 @@ static void debts_ask(silt_fluid *f, const silt_scene *scene, silt_nodes *nodes,
         if (mesh->wet[i]) {
             f->rate[i] = silt_clamp(nodes->debt[i], -FLUID_DEBT_CAP * f->volume[i], FLUID_DEBT_CAP * f->volume[i]) / time;
         }
+    // a piece of water without free surface can neither grow nor shrink: there debts only move
+    int *parent = silt_alloc((size_t)f->n_node + 1, sizeof *parent);
+    double *sum = silt_alloc(2 * (size_t)f->n_node + 2, sizeof *sum);
+    for (int i = 0; i < f->n_node; i++)
+        parent[i] = i;
+    for (int e = 0; e < f->n_cell; e++)
+        silt_group_join(parent, mesh->cell[e]);
+    for (int i = 0; i < f->n_node; i++) {
+        const int r = silt_group_find(parent, i);
+        sum[2 * r] += f->rate[i];
+        sum[2 * r + 1] += mesh->surface[i] ? HUGE_VAL : f->volume[i];
+    }
+    for (int i = 0; i < f->n_node; i++) {
+        const int r = silt_group_find(parent, i);
+        if (isfinite(sum[2 * r + 1]) && sum[2 * r + 1] > 0)
+            f->rate[i] -= sum[2 * r] * f->volume[i] / sum[2 * r + 1];
+    }
+    free(parent);
+    free(sum);
 }
 
 // where water is hemmed in, a debt cannot be paid: it waits. @return whether any was let off
@@ -577,6 +607,12 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_scene *scene, const s
         // velocity with the pressure of the last iterate
         if (def->scheme == SCHEME_IMPLICIT && def->viscosity > 0) {
             memcpy(f->star, f->w, 2 * (size_t)f->n_node * sizeof(double));
+            for (int i = 0; i < f->n_node && f->wall_normals.n_row; i++)
+                if (f->hold[i] == 1) { // normals that have changed with the midpoint mesh
+                    project(f, i, f->star + 2 * i);
+                    for (int d = 0; d < 2; d++)
+                        f->star[2 * i + d] += f->given[2 * i + d];
+                }
             SILT_TRY(momentum_implicit(f, scene, nodes, mesh, f->force, f->star, err));
         } else {
             add_viscous(f, mesh, def->viscosity, f->w, -1, f->force);
@@ -664,6 +700,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_scene *scene, const silt_w
         f->pressure = silt_pressure_create();
     f->seconds_assemble = f->seconds_solve = 0;
     f->iterations = 0;
+    f->walls = walls;
     hold_nodes(f, scene, walls, nodes, mesh);
     for (int i = 0; i < f->n_node; i++) {
         double v[2] = {nodes->v[2 * i], nodes->v[2 * i + 1]}, held[2];

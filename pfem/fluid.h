@@ -27,6 +27,7 @@ typedef struct silt_fluid {
     uint8_t *mobile;      // owned, 1: some neighbour or the node itself can move; 2: but not so that its volume is kept
     double *withheld;     // owned, per node, m3/s: gain that continuity does not see where mobile is not 1
     double *normal;       // owned, 2 per node, where hold is 1
+    const silt_walls *walls; // borrowed for a step
     silt_wall_normals wall_normals; // owned
     double *given;        // owned, 2 per node, what walls that move make of the held part of the velocity
     double *cg[3];        // owned, 2 per node, momentum solver
