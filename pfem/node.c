@@ -15,6 +15,7 @@ void silt_nodes_clear(silt_nodes *nodes) {
 }
 
 static void nodes_reserve(silt_nodes *nodes, int need) {
+    const int dim = silt_nodes_dim(nodes);
     if (need <= nodes->capacity)
         return;
     int capacity = nodes->capacity ? 2 * nodes->capacity : 256;
@@ -25,8 +26,8 @@ static void nodes_reserve(silt_nodes *nodes, int need) {
         int have = nodes->capacity * (per);                                                                            \
         nodes->field = silt_grow(nodes->field, &have, capacity * (per), sizeof *nodes->field);                         \
     } while (0)
-    GROW(x, 2);
-    GROW(v, 2);
+    GROW(x, dim);
+    GROW(v, dim);
     GROW(p, 1);
     if (nodes->h)
         GROW(h, 1);
@@ -40,12 +41,12 @@ static void nodes_reserve(silt_nodes *nodes, int need) {
 }
 
 int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double *x) {
-    const int i = nodes->count;
+    const int i = nodes->count, dim = silt_nodes_dim(nodes);
     nodes_reserve(nodes, i + 1);
     nodes->count++;
-    for (int d = 0; d < 2; d++) {
-        nodes->x[2 * i + d] = x[d];
-        nodes->v[2 * i + d] = 0;
+    for (int d = 0; d < dim; d++) {
+        nodes->x[dim * i + d] = x[d];
+        nodes->v[dim * i + d] = 0;
     }
     nodes->p[i] = 0;
     if (nodes->h)
@@ -59,6 +60,7 @@ int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const doub
 }
 
 void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map) {
+    const int dim = silt_nodes_dim(nodes);
     int k = 0;
     for (int i = 0; i < nodes->count; i++) {
         if (dead[i]) {
@@ -67,9 +69,9 @@ void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map) {
         }
         map[i] = k;
         if (k != i) {
-            for (int d = 0; d < 2; d++) {
-                nodes->x[2 * k + d] = nodes->x[2 * i + d];
-                nodes->v[2 * k + d] = nodes->v[2 * i + d];
+            for (int d = 0; d < dim; d++) {
+                nodes->x[dim * k + d] = nodes->x[dim * i + d];
+                nodes->v[dim * k + d] = nodes->v[dim * i + d];
             }
             memcpy(nodes->wall[k], nodes->wall[i], sizeof nodes->wall[k]);
             nodes->p[k] = nodes->p[i];

@@ -80,7 +80,7 @@ struct silt_run {
     int wall_before_capacity, v_before_capacity;
     int *map;        // owned, renumbering of the last rebuild
     int x_old_capacity, v_old_capacity, debt_old_capacity, map_capacity;
-    double box_lo[2], box_hi[2]; // what lies outside has left
+    double box_lo[3], box_hi[3]; // what lies outside has left
 };
 
 // start.c ---------------------------------------------------------------------------------------------

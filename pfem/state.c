@@ -14,8 +14,8 @@
     X("bed/revision_known", STORE_LONG, run->bed_revision)
 
 #define STATE_NODES(X)                                                                                                 \
-    X("nodes/x", STORE_DOUBLE, run->nodes.x, 2)                                                                        \
-    X("nodes/v", STORE_DOUBLE, run->nodes.v, 2)                                                                        \
+    X("nodes/x", STORE_DOUBLE, run->nodes.x, D)                                                                        \
+    X("nodes/v", STORE_DOUBLE, run->nodes.v, D)                                                                        \
     X("nodes/p", STORE_DOUBLE, run->nodes.p, 1)                                                                        \
     X("nodes/debt", STORE_DOUBLE, run->nodes.debt, 1)                                                                  \
     X("nodes/id", STORE_LONG, run->nodes.id, 1)                                                                        \
@@ -25,7 +25,7 @@
 
 silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
     silt_store *store = NULL;
-    const size_t n = (size_t)run->nodes.count;
+    const size_t n = (size_t)run->nodes.count, D = (size_t)silt_nodes_dim(&run->nodes);
     silt_status status = silt_store_create(&store, path, err);
 #define PUT(name, type, value)                                                                                         \
     if (status == SILT_OK)                                                                                             \
@@ -73,7 +73,8 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
     const silt_scene *scene = run->scene;
     size_t n = 0, n_index = 0;
     SILT_TRY(silt_store_count(store, "nodes/p", &n, err));
-    const double nowhere[2] = {0, 0};
+    const double nowhere[3] = {0};
+    const size_t D = (size_t)silt_nodes_dim(&run->nodes);
     for (size_t i = 0; i < n; i++)
         silt_nodes_add(&run->nodes, NODE_FLUID, -1, nowhere);
 #define TAKE(name, type, value) SILT_TRY(silt_store_take(store, name, type, 1, &(value), err));
