@@ -126,7 +126,11 @@ KERNEL geometry(const int D, silt_fluid *f, const silt_step *s, double dt) {
         f->inertia[i] = mesh->wet[i] ? f->mass[i] / theta_dt + (s->drag ? s->drag->coefficient[i] : 0) + f->friction[i] : 1;
 }
 
-void silt_assemble_geometry(silt_fluid *f, const silt_step *step, double dt) { BY_DIM(geometry, f, step, dt); }
+void silt_assemble_geometry(silt_fluid *f, const silt_step *step, double dt) {
+    BY_DIM(geometry, f, step, dt);
+    if (f->wall_normals.n_row)
+        silt_hold_bent(f, step);
+}
 
 KERNEL pressure(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, double *lost) {
     for (int e = 0; e < f->n_cell; e++) {

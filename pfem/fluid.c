@@ -179,6 +179,8 @@ static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid,
     const int D = f->dim;
     if (s->scene->fluid.scheme == SCHEME_IMPLICIT && viscid) {
         memcpy(f->star, f->w, (size_t)D * (size_t)f->n_node * sizeof(double));
+        for (int i = 0; i < f->n_node && f->wall_normals.n_row; i++)
+            silt_hold_impose(f, i, f->star + D * i); // normals that have changed with the midpoint mesh
         SILT_TRY(silt_momentum_solve(f, s, f->force, f->star, err));
     } else {
         if (viscid)
@@ -254,10 +256,10 @@ static double kinetic_energy(const silt_fluid *f, const silt_step *s, const doub
 static silt_status project_start(silt_fluid *f, const silt_step *s, const double *p, silt_error *err) {
     const int D = f->dim;
     double *v = s->nodes->v;
+    silt_assemble_geometry(f, s, 0);
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i])
-            silt_hold_impose(f, i, v + D * i);
-    silt_assemble_geometry(f, s, 0);
+            silt_hold_turn(f, i, v + D * i);
     silt_assemble_projection(f, s->mesh, p);
     const double before = kinetic_energy(f, s, v);
     for (int pass = 0; pass < 2; pass++) {
@@ -466,7 +468,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         for (int d = 0; d < D; d++)
             f->w[D * i + d] = s->mesh->wet[i] ? nodes->v[D * i + d] : 0;
         if (s->mesh->wet[i])
-            silt_hold_impose(f, i, f->w + D * i);
+            silt_hold_turn(f, i, f->w + D * i);
         f->mobile[i] = 1;
         f->withheld[i] = f->residual[i] = 0;
     }

@@ -87,6 +87,11 @@ static inline double silt_mesh_velocity(const silt_fluid *f, int k) {
 // hold.c -------------------------------------------------------------------------------------------------
 /** which velocity components the surroundings hold, and at what velocity */
 void silt_hold_nodes(silt_fluid *fluid, const silt_step *step);
+/** Renews what holds nodes on bent walls, from the facets of the present midpoint mesh: with any other normals a full tank cannot
+ * keep its volume. */
+void silt_hold_bent(silt_fluid *fluid, const silt_step *step);
+/** silt_hold_impose; on bent walls the velocity keeps its size: turning does no work */
+void silt_hold_turn(const silt_fluid *fluid, int i, double *v);
 /** takes the held components out of a vector of dim numbers */
 void silt_hold_project(const silt_fluid *fluid, int i, double *v);
 /** v with its held components replaced by the given ones */

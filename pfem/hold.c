@@ -25,6 +25,38 @@ void silt_hold_impose(const silt_fluid *f, int i, double *v) {
             v[d] += f->given[f->dim * i + d];
 }
 
+void silt_hold_turn(const silt_fluid *f, int i, double *v) {
+    const int D = f->dim;
+    double whole = 0, along = 0;
+    if (!f->wall_normals.n_row || f->wall_normals.row[i] < 0 || f->hold[i] != HOLD_NORMAL) {
+        silt_hold_impose(f, i, v);
+        return;
+    }
+    for (int d = 0; d < D; d++) {
+        v[d] -= f->given[D * i + d];
+        whole += v[d] * v[d];
+    }
+    silt_hold_project(f, i, v);
+    for (int d = 0; d < D; d++)
+        along += v[d] * v[d];
+    const double factor = along > 0.5 * whole ? sqrt(whole / along) : 1;
+    for (int d = 0; d < D; d++)
+        v[d] = f->given[D * i + d] + factor * v[d];
+}
+
+void silt_hold_bent(silt_fluid *f, const silt_step *s) {
+    const int D = f->dim;
+    silt_wall_normals_take(&f->wall_normals, s->walls, s->nodes, s->mesh, f->x_mid);
+    for (int i = 0; i < f->n_node; i++) {
+        if (s->nodes->kind[i] != NODE_FLUID || f->wall_normals.row[i] < 0)
+            continue;
+        double vector[3], given[3];
+        f->hold[i] = (uint8_t)silt_walls_held(s->walls, s->scene, &f->wall_normals, s->nodes, i, vector, given);
+        memcpy(f->normal + D * i, vector, (size_t)D * sizeof(double));
+        memcpy(f->given + D * i, given, (size_t)D * sizeof(double));
+    }
+}
+
 // slip on the bed: the normal of its facets around the node
 static void hold_bed(silt_fluid *f, const silt_step *s) {
     const silt_mesh *mesh = s->mesh;
@@ -58,7 +90,7 @@ void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
     memset(f->given, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
     if (f->belt)
         memset(f->belt, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
-    silt_wall_normals_take(&f->wall_normals, s->walls, nodes, s->mesh);
+    silt_wall_normals_take(&f->wall_normals, s->walls, nodes, s->mesh, nodes->x);
     for (int i = 0; i < f->n_node; i++) {
         double vector[3] = {0}, given[3];
         f->hold[i] = HOLD_ALL;

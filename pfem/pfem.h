@@ -99,7 +99,10 @@ typedef struct silt_wall_normals {
     double (*normal)[3][3]; // owned, one for each of the node's elements, unit
 } silt_wall_normals;
 struct silt_mesh;
-void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls, const silt_nodes *nodes, const struct silt_mesh *mesh);
+/** @param x  positions that the facets have when what passes through them is counted: those of the midpoint mesh. Normals of any
+ * other moment leave a rest that a full tank can only answer with a pressure without bounds. */
+void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls, const silt_nodes *nodes, const struct silt_mesh *mesh,
+                            const double *x);
 void silt_wall_normals_clear(silt_wall_normals *normals);
 /** silt_walls_hold and silt_walls_given in one, with those normals. @param normals  NULL: the elements' */
 silt_hold silt_walls_held(const silt_walls *walls, const silt_scene *scene, const silt_wall_normals *normals, const silt_nodes *nodes,
