@@ -120,12 +120,24 @@ static bool write_counts(const silt_key_table *table, const silt_key *key, const
     }
 }
 
-static void write_file(FILE *to, const char *path, bool folders) {
-    const char *slash = strrchr(path, '/');
-    write_text(to, folders || !slash ? path : slash + 1);
+/** how files are named in the text */
+typedef struct write_names {
+    silt_file_name *name;
+    void *self;
+} write_names;
+
+static const char *write_whole(void *self, const char *path) {
+    (void)self;
+    return path;
 }
 
-static void write_value(FILE *to, const silt_key *key, const void *base, int dimension, bool folders) {
+static const char *write_last(void *self, const char *path) {
+    (void)self;
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
+}
+
+static void write_value(FILE *to, const silt_key *key, const void *base, int dimension, write_names names) {
     const void *at = (const char *)base + key->offset;
     int number = 0;
     switch (key->kind) {
@@ -154,11 +166,11 @@ static void write_value(FILE *to, const silt_key *key, const void *base, int dim
         break;
     case KEY_FILE:
     case KEY_SURFACE:
-        write_file(to, *(char *const *)at, folders);
+        write_text(to, names.name(names.self, *(char *const *)at));
         break;
     case KEY_SERIES:
     case KEY_TABLE:
-        write_file(to, ((const silt_series *)at)->path, folders);
+        write_text(to, names.name(names.self, ((const silt_series *)at)->path));
         break;
     case KEY_POINT:
         write_numbers(to, dimension, at);
@@ -190,7 +202,7 @@ static void write_value(FILE *to, const silt_key *key, const void *base, int dim
 
 // `dash`: the first row goes behind "- " of a list
 static void write_table(FILE *to, const silt_key_table *table, const void *base, int indent, bool dash, int dimension,
-                        bool folders) {
+                        write_names names) {
     for (const silt_key *key = table->key; key->name; key++) {
         if (!write_counts(table, key, base, dimension))
             continue;
@@ -199,7 +211,7 @@ static void write_table(FILE *to, const silt_key_table *table, const void *base,
         if (key->kind == KEY_BLOCK) {
             fputc('\n', to);
             long before = ftell(to);
-            write_table(to, key->sub, (const char *)base + key->offset, indent + 2, false, dimension, folders);
+            write_table(to, key->sub, (const char *)base + key->offset, indent + 2, false, dimension, names);
             // a block may have nothing to say but that it is there
             if (ftell(to) == before)
                 fprintf(to, "%*s{}\n", indent + 2, "");
@@ -208,22 +220,26 @@ static void write_table(FILE *to, const silt_key_table *table, const void *base,
             int n = *(const int *)((const char *)base + key->count);
             const char *item = *(char *const *)((const char *)base + key->offset);
             for (int i = 0; i < n; i++)
-                write_table(to, key->sub, item + (size_t)i * key->sub->size, indent + 4, true, dimension, folders);
+                write_table(to, key->sub, item + (size_t)i * key->sub->size, indent + 4, true, dimension, names);
         } else {
             fputc(' ', to);
-            write_value(to, key, base, dimension, folders);
+            write_value(to, key, base, dimension, names);
             fputc('\n', to);
         }
     }
 }
 
-char *silt_scene_text(const silt_scene *scene, bool folders) {
+char *silt_scene_named(const silt_scene *scene, silt_file_name *name, void *self) {
     char *text = NULL;
     size_t size = 0;
     FILE *to = open_memstream(&text, &size);
     if (!to)
         return silt_text("%s", "");
-    write_table(to, &silt_scene_keys, scene, 0, false, scene->dimension, folders);
+    write_table(to, &silt_scene_keys, scene, 0, false, scene->dimension, (write_names){name, self});
     fclose(to);
     return text;
+}
+
+char *silt_scene_text(const silt_scene *scene, bool folders) {
+    return silt_scene_named(scene, folders ? write_whole : write_last, NULL);
 }

@@ -92,20 +92,41 @@ static const char *plain_name(const char *path) {
     return strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
 }
 
-// the files that a scene reads: the references of its checks, then the series of its inlets; NULL: none there
-static const char *verify_file(const silt_scene *scene, int i) {
-    return i < scene->n_check ? scene->check[i].reference : scene->fluid.inlet[i - scene->n_check].series.path;
+// ---------------------------------------------------------------- copies of the scene's files
+
+/** the files that a scene reads, and the names of their copies in OUT */
+typedef struct verify_files {
+    int n, path_capacity, name_capacity;
+    char **path, **name; // owned, texts too
+} verify_files;
+
+// the plain name, or one with a number where that is taken, by another file or by what a run writes
+static const char *verify_name(void *self, const char *path) {
+    static const char *const own[] = {"history.csv", "scene.yaml", "summary.json", "run.log", "dem.log", "run.h5"};
+    verify_files *files = self;
+    const char *plain = plain_name(path);
+    bool taken = false;
+    for (int i = 0; i < files->n; i++) {
+        if (strcmp(files->path[i], path) == 0)
+            return files->name[i];
+        taken |= strcmp(files->name[i], plain) == 0;
+    }
+    for (size_t i = 0; i < sizeof own / sizeof *own; i++)
+        taken |= strcmp(plain, own[i]) == 0;
+    SILT_RESERVE(files->path, files->path_capacity, files->n + 1);
+    SILT_RESERVE(files->name, files->name_capacity, files->n + 1);
+    files->path[files->n] = silt_text("%s", path);
+    files->name[files->n] = taken ? silt_text("%d_%s", files->n, plain) : silt_text("%s", plain);
+    return files->name[files->n++];
 }
 
-// the copy of a file in OUT: its plain name, or one with a number when that name is taken
-static char *verify_copy_path(const silt_scene *scene, const char *out, int file) {
-    const char *path = verify_file(scene, file), *name = plain_name(path);
-    for (int i = 0; i < file; i++) {
-        const char *other = verify_file(scene, i);
-        if (other && strcmp(name, plain_name(other)) == 0 && strcmp(path, other) != 0)
-            return silt_text("%s/%d_%s", out, file, name);
+static void verify_files_clear(verify_files *files) {
+    for (int i = 0; i < files->n; i++) {
+        free(files->path[i]);
+        free(files->name[i]);
     }
-    return silt_text("%s/%s", out, name);
+    free(files->path);
+    free(files->name);
 }
 
 static void verify_note(silt_check_result *result, const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -117,14 +138,14 @@ static void verify_note(silt_check_result *result, const char *format, ...) {
 }
 
 // the reference's rows that `where` picks
-static bool verify_read(const silt_scene *scene, const char *out, int check, silt_curve *curve,
+static bool verify_read(const silt_scene *scene, const char *out, verify_files *files, int check, silt_curve *curve,
                         silt_check_result *result) {
     const silt_check_def *def = &scene->check[check];
     const char *wanted[3] = {def->x, def->y, def->where_column};
     int column[3] = {-1, -1, -1};
     silt_series series = {0};
     silt_error err = {0};
-    char *copy = verify_copy_path(scene, out, check);
+    char *copy = silt_text("%s/%s", out, verify_name(files, def->reference));
     bool here = access(copy, R_OK) == 0;
     silt_status status = silt_series_read(here ? NULL : scene->folder, here ? copy : def->reference, &series, &err);
     free(copy);
@@ -149,11 +170,11 @@ static bool verify_read(const silt_scene *scene, const char *out, int check, sil
 }
 
 // difference of the history, or of the profile, from the reference at the reference's abscissas
-static void verify_curve_check(const silt_scene *scene, const char *out, int check, silt_curve *history,
-                               silt_check_result *result) {
+static void verify_curve_check(const silt_scene *scene, const char *out, verify_files *files, int check,
+                               silt_curve *history, silt_check_result *result) {
     const silt_check_def *def = &scene->check[check];
     silt_curve reference = {0};
-    if (!verify_read(scene, out, check, &reference, result))
+    if (!verify_read(scene, out, files, check, &reference, result))
         goto done;
     if (def->kind == CHECK_PROFILE && !silt_profile_sample(scene, out, def, &reference, history, result->note))
         goto done;
@@ -255,6 +276,8 @@ done:
 
 silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_check_result *result, silt_error *err) {
     verify_history history = {0};
+    verify_files files = {0};
+    free(silt_scene_named(scene, verify_name, &files));
     for (int i = 0; i < scene->n_check; i++) {
         const silt_check_def *def = &scene->check[i];
         result[i] = (silt_check_result){.name = def->name, .value = NAN, .reference = NAN, .error = NAN};
@@ -278,12 +301,13 @@ silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_ch
                 silt_curve_add(&curve, x, def->scale * (history.value[k * scene->n_check + i] + def->shift));
         }
         if (def->reference)
-            verify_curve_check(scene, out, i, &curve, &result[i]);
+            verify_curve_check(scene, out, &files, i, &curve, &result[i]);
         else
             verify_scalar_check(def, &curve, &result[i]);
         silt_curve_clear(&curve);
     }
     history_clear(&history);
+    verify_files_clear(&files);
     return status;
 }
 
@@ -317,50 +341,28 @@ static silt_status verify_copy_one(const char *base, const char *path, const cha
     return status;
 }
 
-// the resolved scene, where files are the copies: their rows come in the order of the checks and of the inlets
-static silt_status verify_scene(const silt_scene *scene, const char *out, silt_error *err) {
-    static const char *const row[2] = {"reference: ", "series: "};
-    const int end[2] = {scene->n_check, scene->n_check + scene->fluid.n_inlet};
-    int file[2] = {0, scene->n_check};
-    char *path = silt_text("%s/scene.yaml", out), *aside = silt_text("%s.part", path);
+silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err) {
+    verify_files files = {0};
     silt_status status = SILT_OK;
-    FILE *to = fopen(aside, "w");
-    for (const char *line = scene->resolved, *next; to && *line; line = next) {
-        next = strchr(line, '\n') ? strchr(line, '\n') + 1 : line + strlen(line);
-        const char *key = line + strspn(line, " -");
-        int kind = strncmp(key, row[0], strlen(row[0])) == 0 ? 0 : strncmp(key, row[1], strlen(row[1])) == 0 ? 1 : -1;
-        while (kind >= 0 && file[kind] < end[kind] && !verify_file(scene, file[kind]))
-            file[kind]++;
-        if (kind < 0 || file[kind] == end[kind]) {
-            fwrite(line, 1, (size_t)(next - line), to);
-            continue;
-        }
-        char *copy = verify_copy_path(scene, out, file[kind]++);
-        fprintf(to, "%.*s%s\"", (int)(key - line), line, row[kind]);
-        for (const char *c = plain_name(copy); *c; c++)
-            fprintf(to, *c == '"' || *c == '\\' ? "\\%c" : "%c", *c);
-        fputs("\"\n", to);
-        free(copy);
+    char *text = silt_scene_named(scene, verify_name, &files);
+    for (int i = 0; i < files.n && !status; i++) {
+        char *to = silt_text("%s/%s", out, files.name[i]);
+        status = verify_copy_one(scene->folder, files.path[i], to, err);
+        free(to);
     }
-    if (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0)
+    char *path = silt_text("%s/scene.yaml", out), *aside = silt_text("%s.part", path);
+    FILE *to = status ? NULL : fopen(aside, "w");
+    if (to)
+        fputs(text, to);
+    if (!status && (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0))
         status = silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path, strerror(errno));
     if (to)
         fclose(to);
     free(aside);
     free(path);
+    free(text);
+    verify_files_clear(&files);
     return status;
-}
-
-silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err) {
-    silt_status status = SILT_OK;
-    for (int i = 0; i < scene->n_check + scene->fluid.n_inlet && !status; i++) {
-        if (!verify_file(scene, i))
-            continue;
-        char *to = verify_copy_path(scene, out, i);
-        status = verify_copy_one(scene->folder, verify_file(scene, i), to, err);
-        free(to);
-    }
-    return status ? status : verify_scene(scene, out, err);
 }
 
 static void verify_print(FILE *to, int width, double value) {
