@@ -15,6 +15,10 @@ extern "C" {
  * @return 0, or -1 when memory is exhausted. Coinciding points: the later one gets no triangle. */
 int silt_delaunay_2d(int n, const double *x, int **triangle, int *n_triangle);
 
+/** The same in space: 3 n coordinates, 4 indices a tetrahedron, of positive volume (the fourth on the side of the first three
+ * from which they are seen counter-clockwise). Slivers are left in: four nodes nearly in a plane have a small sphere. */
+int silt_delaunay_3d(int n, const double *x, int **tetrahedron, int *n_tetrahedron);
+
 #ifdef __cplusplus
 }
 #endif

@@ -106,7 +106,8 @@ void silt_draw_slice(const silt_draw_canvas *c, silt_grid *grid) {
 int silt_draw_lines(const silt_draw_canvas *c, double time, double (**line)[4]) {
     silt_walls walls = {0};
     int n = 0, right = 0, up = 1;
-    silt_walls_create(&walls, c->scene);
+    if (silt_walls_create(&walls, c->scene, NULL) != SILT_OK) // the run had them: a file that is gone since is no reason not to draw
+        silt_walls_clear(&walls);
     silt_walls_move(&walls, c->scene, time, 0);
     *line = silt_alloc((size_t)walls.count + 1, sizeof **line);
     if (c->slice)

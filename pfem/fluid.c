@@ -16,6 +16,7 @@ void silt_fluid_clear(silt_fluid *f) {
     free(f->mobile);
     silt_pressure_free(&f->pressure);
     silt_mix_free(&f->mix);
+    silt_wall_normals_clear(&f->wall_normals);
     *f = (silt_fluid){0};
 }
 
@@ -432,7 +433,9 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
             // what is held keeps its velocity, the rest goes on to the end of the step
             for (int d = 0; d < D; d++)
                 nodes->v[D * i + d] += (f->w[D * i + d] - nodes->v[D * i + d]) / def->theta;
-            silt_hold_impose(f, i, nodes->v + D * i);
+            // on a bent wall the velocity turns on: contact takes it along the wall
+            if (!(f->wall_normals.n_row && f->wall_normals.row[i] >= 0 && f->hold[i] == HOLD_NORMAL))
+                silt_hold_impose(f, i, nodes->v + D * i);
         }
     } else
         memcpy(nodes->v, v, (size_t)D * (size_t)f->n_node * sizeof(double));

@@ -47,6 +47,7 @@ typedef struct silt_fluid {
     double *withheld;     // owned, per node, m3/s: gain that continuity does not see where mobile is not 1
     double *normal;       // owned, dim per node: silt_walls_hold's vector
     double *given;        // owned, dim per node, velocity of what is held
+    silt_wall_normals wall_normals; // owned, of nodes on bent walls
     double *cg[3];        // owned, dim per node, momentum solver
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned

@@ -58,29 +58,22 @@ void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
     memset(f->given, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
     if (f->belt)
         memset(f->belt, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
+    silt_wall_normals_take(&f->wall_normals, s->walls, nodes, s->mesh);
     for (int i = 0; i < f->n_node; i++) {
-        double vector[3] = {0}, wall[3];
+        double vector[3] = {0}, given[3];
         f->hold[i] = HOLD_ALL;
-        if (nodes->kind[i] == NODE_FLUID)
-            f->hold[i] = (uint8_t)silt_walls_hold(s->walls, nodes->wall[i], vector);
-        memcpy(f->normal + D * i, vector, (size_t)D * sizeof(double));
         // bodies and inlets move as they were told, walls as they do, the bed not at all
         if (nodes->kind[i] == NODE_BODY || nodes->kind[i] == NODE_INLET || nodes->kind[i] == NODE_CORNER)
             memcpy(f->given + D * i, nodes->v + D * i, (size_t)D * sizeof(double));
-        else if (nodes->kind[i] == NODE_FLUID && f->hold[i] != HOLD_FREE) {
-            silt_walls_velocity(s->walls, s->scene, nodes->wall[i][0], nodes->x + D * i, wall);
-            if (f->hold[i] == HOLD_ALL)
-                memcpy(f->given + D * i, wall, (size_t)D * sizeof(double));
-            else {
-                double along = 0;
-                for (int d = 0; d < D; d++)
-                    along += wall[d] * vector[d];
-                for (int d = 0; d < D; d++)
-                    f->given[D * i + d] = f->hold[i] == HOLD_NORMAL ? along * vector[d] : wall[d] - along * vector[d];
-            }
+        else if (nodes->kind[i] == NODE_FLUID && nodes->wall[i][0] < 0)
+            f->hold[i] = HOLD_FREE;
+        else if (nodes->kind[i] == NODE_FLUID) {
+            f->hold[i] = (uint8_t)silt_walls_held(s->walls, s->scene, &f->wall_normals, nodes, i, vector, given);
+            memcpy(f->given + D * i, given, (size_t)D * sizeof(double));
             if (f->belt && f->hold[i] == HOLD_ALL)
                 memcpy(f->belt + D * i, s->scene->wall[s->walls->wall[nodes->wall[i][0]]].velocity, (size_t)D * sizeof(double));
         }
+        memcpy(f->normal + D * i, vector, (size_t)D * sizeof(double));
     }
     if (s->scene->bed.on && s->scene->bed.condition != WALL_NO_SLIP)
         hold_bed(f, s);

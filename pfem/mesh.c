@@ -1,5 +1,5 @@
-// the water's triangles: adjacency, boundary and measures; what is water is decided in remesh.c
-#include "pfem.h"
+// the water's cells: adjacency, boundary and measures; what is water is decided in remesh.c
+#include "remesh.h"
 
 double silt_cell_area(const double *x, const int *cell) {
     const double *a = x + 2 * cell[0], *b = x + 2 * cell[1], *c = x + 2 * cell[2];
@@ -22,46 +22,184 @@ void silt_group_join(int *parent, const int *cell) {
 double silt_mesh_volume(const silt_mesh *mesh, const double *x) {
     double sum = 0;
     for (int e = 0; e < mesh->n_cell; e++)
-        sum += silt_cell_area(x, mesh->cell[e]);
+        sum += silt_cell_volume(mesh, x, e);
     return sum;
 }
 
-static silt_facet_kind facet_kind(const silt_nodes *nodes, int a, int b) {
-    const silt_node_kind ka = nodes->kind[a], kb = nodes->kind[b];
-    if (ka == NODE_INLET && kb == NODE_INLET)
-        return FACET_INLET;
-    if (ka == NODE_BED && kb == NODE_BED)
-        return FACET_BED;
-    if (ka == NODE_BODY && kb == NODE_BODY && nodes->owner[a] == nodes->owner[b])
-        return FACET_BODY;
-    // on one wall segment, tank corners count for both of theirs; inlets and the bed end on walls
-    for (int s = 0; s < 2; s++)
-        for (int t = 0; t < 2; t++)
-            if (nodes->wall[a][s] >= 0 && nodes->wall[a][s] == nodes->wall[b][t])
-                return FACET_WALL;
-    const bool fixed_a = ka == NODE_CORNER || ka == NODE_BED || ka == NODE_INLET;
-    const bool fixed_b = kb == NODE_CORNER || kb == NODE_BED || kb == NODE_INLET;
-    if (fixed_a && fixed_b)
-        return FACET_WALL;
-    if ((fixed_a && nodes->wall[b][0] >= 0) || (fixed_b && nodes->wall[a][0] >= 0))
-        return FACET_WALL;
-    return FACET_FREE;
+// nodes of the facet opposite each node of a cell; in 2-D water on its left, in 3-D counter-clockwise seen from outside
+static const int side_2d[3][3] = {{1, 2, -1}, {2, 0, -1}, {0, 1, -1}};
+static const int side_3d[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+
+void silt_cell_facet(int dim, const int *cell, int a, int facet[3]) {
+    const int *side = dim == 3 ? side_3d[a] : side_2d[a];
+    for (int k = 0; k < 3; k++)
+        facet[k] = side[k] < 0 ? -1 : cell[side[k]];
 }
 
-static int compare_int(const void *a, const void *b) {
-    return (*(const int *)a > *(const int *)b) - (*(const int *)a < *(const int *)b);
+void silt_cells_across(int dim, int n_node, int n_cell, const int (*cell)[4], int (*across)[4]) {
+    // facets by their lowest node; of those only the other nodes have to be told apart
+    int *start = silt_alloc((size_t)n_node + 1, sizeof *start);
+    uint64_t *key = silt_alloc((size_t)n_cell * (size_t)(dim + 1) + 1, sizeof *key);
+    int *item = silt_alloc((size_t)n_cell * (size_t)(dim + 1) + 1, sizeof *item);
+    for (int pass = 0; pass < 2; pass++) {
+        for (int e = 0; e < n_cell; e++) {
+            // the cell's lowest node is that of all facets but one
+            int lowest = 0, next = -1;
+            for (int a = 1; a <= dim; a++)
+                if (cell[e][a] < cell[e][lowest])
+                    lowest = a;
+            for (int a = 0; a <= dim; a++)
+                if (a != lowest && (next < 0 || cell[e][a] < cell[e][next]))
+                    next = a;
+            if (pass == 0) {
+                start[cell[e][lowest]] += dim;
+                start[cell[e][next]]++;
+                continue;
+            }
+            for (int a = 0; a <= dim; a++) {
+                const int low = a == lowest ? next : lowest;
+                uint32_t other[2] = {UINT32_MAX, UINT32_MAX};
+                for (int b = 0, k = 0; b <= dim; b++)
+                    if (b != a && b != low)
+                        other[k++] = (uint32_t)cell[e][b];
+                const uint64_t lo = other[0] < other[1] ? other[0] : other[1], hi = other[0] < other[1] ? other[1] : other[0];
+                const int k = --start[cell[e][low]];
+                key[k] = lo << 32 | hi;
+                item[k] = 4 * e + a;
+            }
+        }
+        int sum = 0;
+        for (int i = 0; pass == 0 && i <= n_node; i++) {
+            sum += i < n_node ? start[i] : 0;
+            start[i] = sum;
+        }
+    }
+    for (int e = 0; e < n_cell; e++)
+        across[e][0] = across[e][1] = across[e][2] = across[e][3] = -1;
+    for (int i = 0; i < n_node; i++) {
+        // facets still without a partner are kept together at the bucket's front
+        int open = start[i];
+        for (int k = start[i]; k < start[i + 1]; k++) {
+            int m = start[i];
+            while (m < open && key[m] != key[k])
+                m++;
+            if (m < open) {
+                across[item[m] / 4][item[m] % 4] = item[k] / 4;
+                across[item[k] / 4][item[k] % 4] = item[m] / 4;
+                key[m] = key[--open];
+                item[m] = item[open];
+            } else {
+                const uint64_t t = key[k];
+                const int u = item[k];
+                key[open] = t;
+                item[open++] = u;
+            }
+        }
+    }
+    free(start);
+    free(key);
+    free(item);
+}
+
+// true when a fixed node without walls of its own lies in the plane of a wall element, against the facet's length
+static bool facet_on_plane(const silt_mesh *mesh, const silt_nodes *nodes, int i, int on, int element) {
+    if (mesh->dim != 3 || !mesh->walls)
+        return true;
+    double off = 0, length = 0;
+    for (int d = 0; d < 3; d++) {
+        double step = nodes->x[3 * i + d] - nodes->x[3 * on + d];
+        if (mesh->period[d] > 0)
+            step -= mesh->period[d] * floor(step / mesh->period[d] + 0.5);
+        off += step * mesh->walls->normal[element][d];
+        length += step * step;
+    }
+    return fabs(off) <= 0.1 * sqrt(length);
+}
+
+silt_facet_kind silt_facet_kind_of(const silt_mesh *mesh, const silt_nodes *nodes, const int facet[3]) {
+    const int dim = mesh->dim == 3 ? 3 : 2;
+    int n_inlet = 0, n_bed = 0, n_body = 0;
+    for (int k = 0; k < dim; k++) {
+        const int i = facet[k];
+        n_inlet += nodes->kind[i] == NODE_INLET;
+        n_bed += nodes->kind[i] == NODE_BED;
+        n_body += nodes->kind[i] == NODE_BODY && nodes->owner[i] == nodes->owner[facet[0]];
+    }
+    if (n_inlet == dim)
+        return FACET_INLET;
+    if (n_bed == dim)
+        return FACET_BED;
+    if (n_body == dim)
+        return FACET_BODY;
+    if (silt_mesh_share(mesh, nodes, dim, facet))
+        return FACET_WALL;
+    // tank corners count for all walls that they may touch; inlets and the bed end on walls: the others must share one
+    int other[3], fixed[3], n_other = 0, n_fixed = 0;
+    for (int k = 0; k < dim; k++) {
+        const int kind = nodes->kind[facet[k]];
+        if (kind == NODE_CORNER || kind == NODE_BED || kind == NODE_INLET)
+            fixed[n_fixed++] = facet[k];
+        else
+            other[n_other++] = facet[k];
+    }
+    if (n_fixed == 0)
+        return FACET_FREE;
+    if (n_other == 0)
+        return FACET_WALL;
+    if (!silt_mesh_share(mesh, nodes, n_other, other))
+        return FACET_FREE;
+    for (int k = 0; k < n_fixed; k++)
+        if (!facet_on_plane(mesh, nodes, fixed[k], other[0], nodes->wall[other[0]][0]))
+            return FACET_FREE;
+    return FACET_WALL;
+}
+
+bool silt_mesh_share(const silt_mesh *mesh, const silt_nodes *nodes, int n, const int *node) {
+    const int *element[4] = {0};
+    for (int k = 0; k < n && k < 4; k++) {
+        element[k] = nodes->wall[node[k]];
+        if (element[k][0] < 0)
+            return false;
+    }
+    if (mesh->walls)
+        return silt_walls_share(mesh->walls, n, element);
+    // a mesh without walls at hand: the elements themselves
+    for (int s = 0; s < 3; s++) {
+        bool all = element[0][s] >= 0;
+        for (int k = 1; k < n && all; k++)
+            all = element[k][0] == element[0][s] || element[k][1] == element[0][s] || element[k][2] == element[0][s];
+        if (all)
+            return true;
+    }
+    return false;
+}
+
+static void list_sort(int *list, int count) {
+    for (int k = 1; k < count; k++) {
+        const int value = list[k];
+        int m = k;
+        for (; m > 0 && list[m - 1] > value; m--)
+            list[m] = list[m - 1];
+        list[m] = value;
+    }
 }
 
 void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes) {
-    const int n = nodes->count;
+    mesh->dim = silt_nodes_dim(nodes);
+    SILT_RESERVE(mesh->across, mesh->across_capacity, mesh->n_cell + 1);
+    silt_cells_across(mesh->dim, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
+    silt_mesh_connect_known(mesh, nodes);
+}
+
+void silt_mesh_connect_known(silt_mesh *mesh, const silt_nodes *nodes) {
+    const int n = nodes->count, dim = silt_nodes_dim(nodes), n_corner = dim + 1;
     mesh->revision++;
     mesh->n_node = n;
     SILT_RESERVE(mesh->wet, mesh->wet_capacity, n + 1);
     SILT_RESERVE(mesh->surface, mesh->surface_capacity, n + 1);
     SILT_RESERVE(mesh->node_cell_start, mesh->start_capacity, n + 1);
     SILT_RESERVE(mesh->neighbour_start, mesh->neighbour_start_capacity, n + 1);
-    SILT_RESERVE(mesh->node_cell, mesh->node_cell_capacity, 3 * mesh->n_cell + 1);
-    SILT_RESERVE(mesh->neighbour, mesh->neighbour_capacity, 7 * mesh->n_cell + n + 1);
+    SILT_RESERVE(mesh->node_cell, mesh->node_cell_capacity, n_corner * mesh->n_cell + 1);
     memset(mesh->wet, 0, (size_t)n);
     memset(mesh->surface, 0, (size_t)n);
 
@@ -69,7 +207,7 @@ void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes) {
     int *start = mesh->node_cell_start;
     memset(start, 0, (size_t)(n + 1) * sizeof *start);
     for (int e = 0; e < mesh->n_cell; e++)
-        for (int a = 0; a < 3; a++)
+        for (int a = 0; a < n_corner; a++)
             start[mesh->cell[e][a]]++;
     int sum = 0;
     for (int i = 0; i <= n; i++) {
@@ -78,53 +216,60 @@ void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes) {
         start[i] = sum;
     }
     for (int e = mesh->n_cell - 1; e >= 0; e--)
-        for (int a = 0; a < 3; a++)
+        for (int a = 0; a < n_corner; a++)
             mesh->node_cell[--start[mesh->cell[e][a]]] = e;
 
-    // neighbours, the node itself included, rising; an edge that only one cell has is boundary
+    // neighbours, the node itself included, rising; a facet that only one cell has is boundary
     mesh->n_facet = 0;
     int filled = 0;
+    int *seen = silt_alloc((size_t)n + 1, sizeof *seen); // 1 + the last node that has it as neighbour
     for (int i = 0; i < n; i++) {
+        SILT_RESERVE(mesh->neighbour, mesh->neighbour_capacity, filled + dim * (start[i + 1] - start[i]) + 1);
         int *list = mesh->neighbour + filled, count = 0;
         mesh->neighbour_start[i] = filled;
         list[count++] = i;
+        seen[i] = i + 1;
         for (int k = start[i]; k < start[i + 1]; k++)
-            for (int a = 0; a < 3; a++) {
+            for (int a = 0; a < n_corner; a++) {
                 const int j = mesh->cell[mesh->node_cell[k]][a];
-                int known = 0;
-                while (known < count && list[known] != j)
-                    known++;
-                if (known == count)
+                if (seen[j] != i + 1) {
+                    seen[j] = i + 1;
                     list[count++] = j;
+                }
             }
-        qsort(list, (size_t)count, sizeof *list, compare_int);
+        list_sort(list, count);
         filled += count;
         mesh->wet[i] = start[i + 1] > start[i];
 
-        // edges that leave i counter-clockwise in one cell and come back in none
-        for (int k = start[i]; k < start[i + 1]; k++) {
-            const int *cell = mesh->cell[mesh->node_cell[k]];
-            const int a = cell[0] == i ? 0 : cell[1] == i ? 1 : 2, j = cell[(a + 1) % 3];
-            bool twice = false;
-            for (int m = start[i]; m < start[i + 1] && !twice; m++) {
-                const int *other = mesh->cell[mesh->node_cell[m]];
-                const int b = other[0] == i ? 0 : other[1] == i ? 1 : 2;
-                twice = other[(b + 2) % 3] == j;
+        // facets are listed at their first node in 2-D, at their lowest in 3-D
+        for (int k = start[i]; k < start[i + 1]; k++)
+            for (int a = 0; a < n_corner; a++) {
+                const int e = mesh->node_cell[k];
+                int facet[3];
+                if (mesh->across[e][a] >= 0)
+                    continue;
+                silt_cell_facet(dim, mesh->cell[e], a, facet);
+                if (dim == 3 && facet[0] >= i)
+                    while (facet[1] < facet[0] || facet[2] < facet[0]) {
+                        const int t = facet[0];
+                        facet[0] = facet[1];
+                        facet[1] = facet[2];
+                        facet[2] = t;
+                    }
+                if (facet[0] != i)
+                    continue;
+                SILT_RESERVE(mesh->facet, mesh->facet_capacity, mesh->n_facet + 1);
+                SILT_RESERVE(mesh->facet_kind, mesh->facet_kind_capacity, mesh->n_facet + 1);
+                memcpy(mesh->facet[mesh->n_facet], facet, sizeof facet);
+                mesh->facet_kind[mesh->n_facet++] = (uint8_t)silt_facet_kind_of(mesh, nodes, facet);
             }
-            if (twice)
-                continue;
-            SILT_RESERVE(mesh->facet, mesh->facet_capacity, mesh->n_facet + 1);
-            SILT_RESERVE(mesh->facet_kind, mesh->facet_kind_capacity, mesh->n_facet + 1);
-            mesh->facet[mesh->n_facet][0] = i;
-            mesh->facet[mesh->n_facet][1] = j;
-            mesh->facet[mesh->n_facet][2] = -1;
-            mesh->facet_kind[mesh->n_facet++] = (uint8_t)facet_kind(nodes, i, j);
-        }
     }
+    free(seen);
     mesh->neighbour_start[n] = filled;
     for (int k = 0; k < mesh->n_facet; k++)
-        if (mesh->facet_kind[k] == FACET_FREE)
-            mesh->surface[mesh->facet[k][0]] = mesh->surface[mesh->facet[k][1]] = 1;
+        for (int a = 0; a < dim; a++)
+            if (mesh->facet_kind[k] == FACET_FREE)
+                mesh->surface[mesh->facet[k][a]] = 1;
 }
 
 void silt_mesh_clear(silt_mesh *mesh) {
@@ -137,34 +282,92 @@ void silt_mesh_clear(silt_mesh *mesh) {
     free(mesh->node_cell);
     free(mesh->neighbour_start);
     free(mesh->neighbour);
+    free(mesh->across);
     *mesh = (silt_mesh){0};
 }
 
 void silt_cell_corners(const silt_mesh *mesh, const double *x, const int *cell, double *corner) {
     const int dim = mesh->dim == 3 ? 3 : 2;
-    for (int a = 0; a <= dim; a++)
-        for (int d = 0; d < dim; d++) {
-            double step = x[dim * cell[a] + d] - x[dim * cell[0] + d];
-            if (mesh->period[d] > 0)
-                step -= mesh->period[d] * floor(step / mesh->period[d] + 0.5);
-            corner[dim * a + d] = x[dim * cell[0] + d] + step;
+    for (int d = 0; d < dim; d++) {
+        const double first = x[dim * cell[0] + d], period = mesh->period[d];
+        for (int a = 0; a <= dim; a++) {
+            const double at = x[dim * cell[a] + d];
+            corner[dim * a + d] = period > 0 ? first + (at - first - period * floor((at - first) / period + 0.5)) : at;
         }
+    }
 }
 
-double silt_simplex_volume(int dim, const double *c) {
-    if (dim == 2)
-        return 0.5 * ((c[2] - c[0]) * (c[5] - c[1]) - (c[3] - c[1]) * (c[4] - c[0]));
+static double tetrahedron_volume(const double *a, const double *b, const double *c, const double *d) {
     double u[3], v[3], w[3];
-    for (int d = 0; d < 3; d++) {
-        u[d] = c[3 + d] - c[d];
-        v[d] = c[6 + d] - c[d];
-        w[d] = c[9 + d] - c[d];
+    for (int k = 0; k < 3; k++) {
+        u[k] = b[k] - a[k];
+        v[k] = c[k] - a[k];
+        w[k] = d[k] - a[k];
     }
     return (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6;
 }
 
+double silt_simplex_volume(int dim, const double *c) {
+    if (dim != 3)
+        return 0.5 * ((c[2] - c[0]) * (c[5] - c[1]) - (c[3] - c[1]) * (c[4] - c[0]));
+    return tetrahedron_volume(c, c + 3, c + 6, c + 9);
+}
+
 double silt_cell_volume(const silt_mesh *mesh, const double *x, int e) {
-    double corner[12];
-    silt_cell_corners(mesh, x, mesh->cell[e], corner);
-    return silt_simplex_volume(mesh->dim == 3 ? 3 : 2, corner);
+    const int *cell = mesh->cell[e];
+    if (mesh->period[0] > 0 || mesh->period[1] > 0 || mesh->period[2] > 0) {
+        double c[12];
+        silt_cell_corners(mesh, x, cell, c);
+        return silt_simplex_volume(mesh->dim, c);
+    }
+    if (mesh->dim != 3)
+        return silt_cell_area(x, cell);
+    return tetrahedron_volume(x + 3 * cell[0], x + 3 * cell[1], x + 3 * cell[2], x + 3 * cell[3]);
+}
+
+double silt_cell_h(const silt_nodes *nodes, int n_corner, const int *cell, double size) {
+    if (!nodes->h)
+        return size;
+    double sum = 0;
+    for (int a = 0; a < n_corner; a++)
+        sum += nodes->h[cell[a]];
+    return sum / n_corner;
+}
+
+static void cross(const double *a, const double *b, double *c) {
+    c[0] = a[1] * b[2] - a[2] * b[1];
+    c[1] = a[2] * b[0] - a[0] * b[2];
+    c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static double dot(const double *a, const double *b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+silt_cell_shape silt_cell_measure(int dim, const double *corner) {
+    if (dim != 3) {
+        const double *a = corner, *b = corner + 2, *c = corner + 4;
+        const double area = 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+        const double ab = hypot(b[0] - a[0], b[1] - a[1]), bc = hypot(c[0] - b[0], c[1] - b[1]);
+        const double ca = hypot(a[0] - c[0], a[1] - c[1]);
+        const double longest = silt_max(ab, silt_max(bc, ca));
+        return (silt_cell_shape){area, area > 0 ? ab * bc * ca / (4 * area) : HUGE_VAL, longest > 0 ? 2 * area / longest : 0};
+    }
+    double u[3], v[3], w[3], vw[3], wu[3], uv[3], opposite[3], centre[3];
+    for (int d = 0; d < 3; d++) {
+        u[d] = corner[3 + d] - corner[d];
+        v[d] = corner[6 + d] - corner[d];
+        w[d] = corner[9 + d] - corner[d];
+    }
+    cross(v, w, vw);
+    cross(w, u, wu);
+    cross(u, v, uv);
+    const double six = dot(u, vw), uu = dot(u, u), vv = dot(v, v), ww = dot(w, w);
+    for (int d = 0; d < 3; d++) {
+        opposite[d] = vw[d] + wu[d] + uv[d]; // twice the area of the facet that the first node does not have
+        centre[d] = uu * vw[d] + vv * wu[d] + ww * uv[d];
+    }
+    const double largest = silt_max(silt_max(dot(vw, vw), dot(wu, wu)), silt_max(dot(uv, uv), dot(opposite, opposite)));
+    return (silt_cell_shape){six / 6, six > 0 ? sqrt(dot(centre, centre)) / (2 * six) : HUGE_VAL,
+                             largest > 0 ? six / sqrt(largest) : 0};
 }

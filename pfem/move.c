@@ -18,8 +18,9 @@ void silt_run_prescribe(silt_run *run) {
             v[0] = body->v[0] - body->w[2] * (nodes->x[2 * i + 1] - body->x[1]);
             v[1] = body->v[1] + body->w[2] * (nodes->x[2 * i] - body->x[0]);
         } else if (nodes->kind[i] == NODE_CORNER) {
-            double wall[3];
-            silt_walls_velocity(&run->walls, scene, nodes->owner[i], nodes->x + D * i, wall);
+            double wall[3] = {0};
+            if (nodes->owner[i] >= 0)
+                silt_walls_velocity(&run->walls, scene, nodes->owner[i], nodes->x + D * i, wall);
             memcpy(v, wall, (size_t)D * sizeof(double));
         }
     }
@@ -42,28 +43,32 @@ static void acceleration(const silt_run *run, const double *x, double a[3]) {
 static void fly(silt_run *run, int i) {
     silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
-    double *x = nodes->x + D * i, *v = nodes->v + D * i, a[3], vector[3], wall[3] = {0};
+    double *x = nodes->x + D * i, *v = nodes->v + D * i, a[3];
     const double dt = run->dt;
     acceleration(run, x, a);
-    const silt_hold hold = silt_walls_hold(&run->walls, nodes->wall[i], vector);
-    if (hold != HOLD_FREE) {
-        const double *n = run->walls.normal[nodes->wall[i][0]];
-        silt_walls_velocity(&run->walls, run->scene, nodes->wall[i][0], x, wall);
-        if (silt_dot(D, a, n) > 0)
+    const int s = nodes->wall[i][0];
+    if (s >= 0) {
+        double vector[3], own[3], given[3];
+        silt_walls_velocity(&run->walls, run->scene, s, x, own);
+        const double *n = run->walls.normal[s], an = silt_dot(D, a, n), vn = silt_dot(D, v, n);
+        // pressed on: left alone it would come nearer to the wall than the wall goes away from it
+        if (vn - silt_dot(D, own, n) + 0.5 * dt * an <= 0) {
+            silt_walls_given(&run->walls, run->scene, nodes->wall[i], x, given);
+            const silt_hold hold = silt_walls_hold(&run->walls, nodes->wall[i], vector);
+            if (hold == HOLD_ALL) { // stuck, or in a corner
+                for (int d = 0; d < D; d++) {
+                    v[d] = given[d];
+                    x[d] += dt * v[d];
+                }
+                return;
+            }
+            const double along = silt_dot(D, a, vector), speed = silt_dot(D, v, vector);
+            for (int d = 0; d < D; d++) {
+                a[d] = hold == HOLD_NORMAL ? a[d] - along * vector[d] : along * vector[d];
+                v[d] = (hold == HOLD_NORMAL ? v[d] - speed * vector[d] : speed * vector[d]) + given[d];
+            }
+        } else
             nodes->wall[i][0] = nodes->wall[i][1] = nodes->wall[i][2] = -1;
-        else if (hold == HOLD_ALL) { // stuck, or in a corner: it goes with the wall
-            for (int d = 0; d < D; d++) {
-                v[d] = wall[d];
-                x[d] += dt * v[d];
-            }
-            return;
-        } else {
-            const double an = silt_dot(D, a, vector), vn = silt_dot(D, v, vector) - silt_dot(D, wall, vector);
-            for (int d = 0; d < D; d++) {
-                a[d] = hold == HOLD_NORMAL ? a[d] - an * vector[d] : an * vector[d];
-                v[d] = hold == HOLD_NORMAL ? v[d] - vn * vector[d] : wall[d] + vn * vector[d];
-            }
-        }
     }
     for (int d = 0; d < D; d++) {
         x[d] += dt * (v[d] + 0.5 * dt * a[d]);
@@ -297,12 +302,14 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     hand_on_landing(run, run->wall_before, run->v_before);
     let_out(run);
     expel(run);
+    mesh->walls = &run->walls;
     silt_mesh_refine(mesh, nodes, &run->memory, h);
 
     const double middle = silt_seconds();
     run->phase[PHASE_move] += middle - since;
     SILT_RESERVE(run->map, run->map_capacity, nodes->count + 1);
     SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
+    silt_nodes_hand_on(nodes, mesh, &run->memory, run->map);
     run->ledger.volume_reconnected += run->memory.reconnected;
     // without an outlet nothing may leave: what does anyway shows as a volume error
     if (scene->fluid.n_outlet)

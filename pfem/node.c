@@ -15,9 +15,9 @@ void silt_nodes_clear(silt_nodes *nodes) {
 }
 
 static void nodes_reserve(silt_nodes *nodes, int need) {
+    const int dim = silt_nodes_dim(nodes);
     if (need <= nodes->capacity)
         return;
-    const int dim = silt_nodes_dim(nodes);
     int capacity = nodes->capacity ? 2 * nodes->capacity : 256;
     while (capacity < need)
         capacity *= 2;

@@ -39,13 +39,15 @@ typedef struct silt_nodes {
 
 static inline int silt_nodes_dim(const silt_nodes *nodes) { return nodes->dim == 3 ? 3 : 2; }
 /** wanted distance of node i to its neighbours; size: fluid.size */
-static inline double silt_node_h(const silt_nodes *nodes, int i, double size) { return nodes->h ? nodes->h[i] : size; }
+static inline double silt_node_h(const silt_nodes *nodes, int i, double size) {
+    return nodes->h && nodes->h[i] > 0 ? nodes->h[i] : size; // 0: added since the last silt_size_update
+}
 
 // ---------------------------------------------------------------- walls (wall.c)
 
 /** where a moving wall of the scene stands and how it moves */
 typedef struct silt_wall_motion {
-    double shift[3], angle;   // m and rad, from the place in the scene; in 3-D the angle is about the y axis
+    double shift[3], angle;   // m and rad, from the place in the scene; the angle turns from x to y, in 3-D from x to z
     double velocity[3], spin; // m/s of the centre, rad/s
     double centre[3];         // m, what it turns about, at its present place
 } silt_wall_motion;
@@ -66,27 +68,58 @@ typedef struct silt_walls {
     int (*joined)[3];            // owned, 3-D: element across the edge that starts at each corner, -1
     int n_wall;
     silt_wall_motion *motion;    // owned, one per wall of the scene
-    struct silt_wall_index *index; // owned, elements by place (wall.c)
+    int n_degenerate;            // triangles of surface files without area, left out
+    struct silt_wall_index *index; // owned, elements by place, what moves (wall.h)
 } silt_walls;
 
 /** which components of a node's velocity are held */
 typedef enum { HOLD_FREE = 0, HOLD_NORMAL, HOLD_ALL, HOLD_LINE } silt_hold; // LINE: free along one direction only
 
-void silt_walls_create(silt_walls *walls, const silt_scene *scene);
+/** Builds the walls of a scene where they stand at time 0: polylines in 2-D, boxes and surfaces from files in 3-D. Elements that
+ * meet are joined, also of different walls, but not with a wall that moves. Errors (SILT_INPUT): a surface file that cannot
+ * serve, see wall.h; the walls are empty then. */
+silt_status silt_walls_create(silt_walls *walls, const silt_scene *scene, silt_error *err);
 void silt_walls_clear(silt_walls *walls);
 /** Places the walls that move where they are at `time`; their velocities are those that carry them there from `time - dt`.
  * @param dt  s, the step that ends at `time`; 0: the velocity of that moment */
 void silt_walls_move(silt_walls *walls, const silt_scene *scene, double time, double dt);
 /** How the elements hold a node: vector is the unit normal (HOLD_NORMAL) or the free direction (HOLD_LINE) */
 silt_hold silt_walls_hold(const silt_walls *walls, const int element[3], double vector[3]);
-/** velocity of the wall's material at x, m/s: its motion and its surface velocity */
+/** Velocity of the wall's material that was at x at the start of the step, m/s: the way that it goes in the step over dt, and
+ * the surface's velocity along itself. */
 void silt_walls_velocity(const silt_walls *walls, const silt_scene *scene, int element, const double *x, double v[3]);
+/** The held part of the velocity of a node at x (start of the step): along the normal (HOLD_NORMAL), across the line (HOLD_LINE),
+ * all of it (HOLD_ALL), 0 (HOLD_FREE). A node that moves with it and any free part lands on the walls where they are now. */
+void silt_walls_given(const silt_walls *walls, const silt_scene *scene, const int element[3], const double *x, double v[3]);
+/** Normals at nodes on patches that bend: those of the water's own facets on the patch around the node, weighted with their size.
+ * With the elements' normals water would pass between nodes on two sides of a bend (Engelman, Sani and Gresho 1982). */
+typedef struct silt_wall_normals {
+    int n_row, row_capacity, normal_capacity;
+    int *row;               // owned, one per node: its row of normals, -1: the elements' normals; NULL without bent patches
+    double (*normal)[3][3]; // owned, one for each of the node's elements, unit
+} silt_wall_normals;
+struct silt_mesh;
+void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls, const silt_nodes *nodes, const struct silt_mesh *mesh);
+void silt_wall_normals_clear(silt_wall_normals *normals);
+/** silt_walls_hold and silt_walls_given in one, with those normals. @param normals  NULL: the elements' */
+silt_hold silt_walls_held(const silt_walls *walls, const silt_scene *scene, const silt_wall_normals *normals, const silt_nodes *nodes,
+                          int i, double vector[3], double given[3]);
 /** true when the nodes share a patch: a facet between them lies on the wall */
 bool silt_walls_share(const silt_walls *walls, int n, const int *const element[]);
 /** Signed distance of a point to the nearest element, positive on the water's side; *element is that element (-1: no walls,
- * distance +inf). At a vertex the side is decided by the elements that meet there. */
+ * distance +inf). At edges and vertices the side is decided by the elements that meet there; inside of a closed obstacle it
+ * is negative whatever else is near. */
 double silt_walls_distance(const silt_walls *walls, const double *point, int *element);
-/** Nodes that lie on walls: puts them exactly on, lets them turn corners, attaches what has come through or touches. */
+/** Elements within reach of x that turn by more than 30 degrees from each other: none, or up to as many as dimensions, the nearest
+ * first, the rest -1; on is the point that lies exactly on all of them (x itself where there is none). @return how many */
+int silt_walls_touching(const silt_walls *walls, const double *x, double reach, int element[3], double on[3]);
+/** Where fixed nodes (NODE_CORNER) keep the shape of walls that point into the water: corners in 2-D, edges in 3-D with points at
+ * spacing h, bends above 30 degrees. Not where the edge lies on another wall (the foot of a gate, of a box on the floor).
+ * @return how many; *point (3 numbers each) and *element (owner first, then others, -1) are malloc'ed, owned by the caller */
+int silt_walls_ridges(const silt_walls *walls, double h, double **point, int (**element)[3]);
+/** Nodes that lie on walls, after all nodes have moved from x_old: carries fixed nodes and those on walls without slip with their
+ * walls, puts the others exactly on, lets them slide over bends and along creases, stop in corners and come free at edges,
+ * attaches what has come through a wall or touches it, fills empty creases and corners with the nearest node. */
 void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double *x_old, const uint8_t *interior, double h);
 
 // ---------------------------------------------------------------- nodes (node.c, seed.c)
@@ -96,10 +129,16 @@ void silt_nodes_clear(silt_nodes *nodes);
 int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double *x);
 /** Removes nodes with dead[i] != 0, keeps the order; map[i] is the new index or -1 */
 void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map);
-/** Fills the scene's regions with water nodes, inlets and tank corners; leaves out what lies in `solid` (bed, bodies). */
-typedef bool (*silt_solid_test)(const void *context, const double x[2], double margin);
+/** Fills the scene's regions with water nodes, inlets and tank corners; leaves out what lies in `solid` (bed, bodies). With
+ * fluid.sizes the spacing is the local one and nodes->h is written. */
+typedef bool (*silt_solid_test)(const void *context, const double *x, double margin);
 void silt_nodes_seed(silt_nodes *nodes, const silt_scene *scene, const silt_walls *walls, silt_solid_test solid,
                      const void *context);
+/** The same with the water's nodes from the file fluid.cloud: columns x, y[, z] and, if there, vx, vy[, vz], which then win over
+ * fluid.velocity. Nodes on walls are put onto them, those on inlets and tank corners are left out.
+ * Errors: SILT_INPUT, file and line of what is missing, not a number, behind a wall, in a solid, or there twice. */
+silt_status silt_nodes_read(silt_nodes *nodes, const silt_scene *scene, const silt_walls *walls, silt_solid_test solid,
+                            const void *context, silt_error *err);
 /** Points along a closed outline at spacing h, corners kept. @return how many; xy malloc'ed, owned by the caller */
 int silt_outline_points(int n, const double *outline, double h, double **xy);
 
@@ -108,12 +147,17 @@ int silt_outline_points(int n, const double *outline, double h, double **xy);
 typedef struct silt_size silt_size; // NULL: fluid.size everywhere
 /** Made from fluid.sizes; NULL without them. */
 void silt_size_create(silt_size **size, const silt_scene *scene, const silt_walls *walls);
-/** Follows what moves (surface, bed, bodies, walls) and writes nodes->h. */
+/** Follows what moves (surface, bed, bodies, wet walls) and writes nodes->h of every node; to be called after every rebuild. */
 struct silt_mesh;
 void silt_size_update(silt_size *size, silt_nodes *nodes, const struct silt_mesh *mesh);
+/** Points that stand for surface, bed or bodies until the first update, dim numbers each (the first cloud needs them). */
+void silt_size_near(silt_size *size, silt_near near, int n, const double *x);
 /** wanted distance between nodes at a point, m (at the last update); size NULL: fluid.size */
 double silt_size_at(const silt_size *size, const silt_scene *scene, const double *x);
 void silt_size_free(silt_size **size);
+/** signed distance from a region, m, negative inside; dim 3: polygons are upright prisms in x-z, circles are spheres */
+double silt_region_distance(const silt_region *region, int dim, const double *x);
+void silt_region_span(const silt_region *region, int dim, double lo[3], double hi[3]); /**< its bounds, m */
 
 // ---------------------------------------------------------------- mesh (mesh.c)
 
@@ -132,16 +176,25 @@ typedef struct silt_mesh {
     int facet_capacity;
     int (*facet)[3];   // owned, the water's boundary: edges with water on the left (facet[2] = -1), or faces, counter-clockwise from outside
     uint8_t *facet_kind; // owned, silt_facet_kind
+    const silt_walls *walls; // borrowed, tells which nodes share a wall's patch; NULL: nodes of one element do (set by the rebuild)
+    int (*across)[4];  // owned, cell on the other side of the facet opposite each node of a cell, -1 on the boundary
     uint8_t *wet;      // owned, one per node: 1 when the node has a cell
     uint8_t *surface;  // owned, one per node: 1 when the node has a free facet
     int *node_cell_start, *node_cell; // owned, cells of a node (start has n_node + 1)
     int *neighbour_start, *neighbour; // owned, nodes joined to a node by an edge, itself included, rising
     int wet_capacity, surface_capacity, start_capacity, neighbour_start_capacity, node_cell_capacity, neighbour_capacity;
-    int facet_kind_capacity;
+    int facet_kind_capacity, across_capacity;
 } silt_mesh;
 
-/** Derived data of the topology: adjacency, boundary facets, wet and surface flags. Raises the revision. */
+/** Derived data of the topology: adjacency, boundary facets, wet and surface flags. Raises the revision. Takes the dimension
+ * from the nodes; the caller of a mesh read back sets mesh->walls and mesh->period before. */
 void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes);
+/** Cells on the other side of each facet (opposite each node), -1: none. Any set of cells in which a facet has at most two. */
+void silt_cells_across(int dim, int n_node, int n_cell, const int (*cell)[4], int (*across)[4]);
+/** nodes of the facet opposite node a of a cell, turned as facets of the boundary are */
+void silt_cell_facet(int dim, const int *cell, int a, int facet[3]);
+/** true when the nodes share a patch of the mesh's walls */
+bool silt_mesh_share(const silt_mesh *mesh, const silt_nodes *nodes, int n, const int *node);
 void silt_mesh_clear(silt_mesh *mesh);
 double silt_cell_area(const double *x, const int *cell); // 2-D
 /** m2 or m3 of a triangle or tetrahedron from its corners, dim numbers each */
@@ -160,25 +213,48 @@ double silt_mesh_volume(const silt_mesh *mesh, const double *x);
  * those of the cloud with dead nodes still in place and new ones appended. */
 #define NODE_LEFT 2
 typedef struct silt_memory {
+    int dim;          // as the mesh's
+    double period[3]; // as the mesh's
     int n_cell, cell_capacity, area_capacity;
     int (*cell)[4];   // owned, cells that were water: the old mesh, and bed cells that became water
-    double *area;     // owned, m2, what each of them held before the cloud was edited
+    double *area;     // owned, m2 or m3, what each of them held before the cloud was edited
+    int n_place, place_capacity;
+    double *x;        // owned, dim per node, m, where the first n_place nodes were then
     int n_taken, taken_capacity, taken_area_capacity;
     int (*taken)[4];  // owned, bed cells that grew into the water
     double *taken_area; // owned, m2
     int n_node, flag_capacity, dead_capacity;
     uint8_t *interior; // owned, one per node: had cells and no free facet
     uint8_t *dead;     // owned, one per node: leaves the cloud at the rebuild; NODE_LEFT: takes its water out of the domain
+    int momentum_capacity;
+    double *momentum;  // owned, dim + 1 per cell: its volume times mean velocity, m4/s, and volume, m3, when the cloud was edited
     double reconnected;     // m3, volume that the rebuild itself made (positive) or lost
     double left;            // m3, volume that went with the nodes that left
+    int flat;               // 3-D: cells flatter than a fiftieth of h that could not be mended
+    bool record;            // set by the caller: the rebuild writes the exchange below (silt_momentum_hand_on)
+    int n_group, n_exchange, group_capacity, exchange_capacity;
+    int *group_start;       // owned, n_group + 1: groups of cells that came and went together, each with its nodes
+    struct silt_share {
+        int node;      // in the memory's numbers
+        double before; // m3, what the node had of the group's cells: a share of each
+        double change; // m3, what it has of the new ones more than that, its debt counted as its own; sums to 0 over a group
+    } *exchange;          // owned
 } silt_memory;
 void silt_memory_clear(silt_memory *memory);
 /** Takes down the present mesh with its areas at positions x (before the cloud is edited). */
 void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nodes *nodes);
 /** Makes the memory's flags as long as the cloud is now. */
 void silt_memory_extend(silt_memory *memory, int n_node);
-/** Marks crowded nodes dead and adds nodes where the mesh is stretched (refine.c). */
+/** Marks crowded nodes dead and adds nodes where the mesh is stretched, against the local size (refine.c). Nodes added on
+ * curved walls are put onto them (mesh->walls).
+ * @param h  fluid.size */
 void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h);
+/** After the rebuild: what cells that came and went together held as momentum, their nodes have again (refine.c).
+ * @param map  of the rebuild */
+void silt_nodes_hand_on(silt_nodes *nodes, const silt_mesh *mesh, const silt_memory *memory, const int *map);
+/** Shifts inner nodes by up to fluid.shuffle * h in each direction, their pressure and velocity with them along the mesh's
+ * gradients. The random numbers hang on fluid.seed, the step and the node's id. Before silt_memory_take. */
+void silt_nodes_shuffle(silt_nodes *nodes, const silt_mesh *mesh, const silt_scene *scene, int64_t step);
 
 /** what the water cannot enter */
 typedef struct silt_barrier {
@@ -197,16 +273,31 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
 silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
                               silt_memory *memory, int *map, silt_error *err);
 
+/** Hands on momentum when a rebuild has changed the nodes' share of the water (momentum.c). With masses that count the debts,
+ * m = density (share of the cells + debt), sum m v stays to rounding, kinetic energy does not grow and no velocity leaves the
+ * range of its group and neighbours; prescribed velocities and the walls' normals are kept. Old numbering is the memory's, with
+ * the nodes that refinement added.
+ * @param memory  of the rebuild just made, with record set before it
+ * @param mesh    the new one
+ * @param mass    kg, old numbering: masses to use in place of m; NULL: m before the rebuild
+ * @param debt    m3, old numbering, the nodes' debts before the rebuild
+ * @param v       m/s, dim per node, old numbering, velocities before the rebuild
+ * @param map     of the rebuild
+ * @param lost    out, kg m/s, what could not be placed within the limits (groups that walls hold) */
+void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, silt_nodes *nodes, double density,
+                           const double *mass, const double *debt, const double *v, const int *map, double lost[3]);
+
 /** Finds points in the water. Rebuilt when mesh->revision or the positions changed (locate_build). */
 typedef struct silt_locator {
-    double lo[2], cell_size;
-    int nx, ny;
+    double lo[3], size[3]; // m, of the grid's bins
+    int n[3];              // bins along each axis; a periodic axis wraps
     int *start, *item; // owned, grid cell -> mesh cells that may hold it
     int start_capacity, item_capacity;
 } silt_locator;
 void silt_locator_build(silt_locator *locator, const silt_mesh *mesh, const double *x, double h);
-/** Cell that holds the point and its three barycentric weights, or -1 */
-int silt_locate(const silt_locator *locator, const silt_mesh *mesh, const double *x, const double *point, double weight[3]);
+/** Cell that holds the point, or -1; across a periodic border any image of the point will do.
+ * @param weight  out, dim + 1 barycentric weights */
+int silt_locate(const silt_locator *locator, const silt_mesh *mesh, const double *x, const double *point, double *weight);
 void silt_locator_clear(silt_locator *locator);
 
 // ---------------------------------------------------------------- what grains do to the water in a step

@@ -1,13 +1,6 @@
 // decides what is water: Delaunay of the cloud, held against what was water a step ago; books the volume that this makes or loses
 #include "delaunay.h"
-#include "pfem.h"
-
-static double circumradius(const double *x, const int cell[3], double area) {
-    const double *a = x + 2 * cell[0], *b = x + 2 * cell[1], *c = x + 2 * cell[2];
-    const double ab = hypot(b[0] - a[0], b[1] - a[1]), bc = hypot(c[0] - b[0], c[1] - b[1]);
-    const double ca = hypot(a[0] - c[0], a[1] - c[1]);
-    return area > 0 ? ab * bc * ca / (4 * area) : HUGE_VAL;
-}
+#include "remesh.h"
 
 static bool polygon_contains(int n, const double *p, double x, double y) {
     bool in = false;
@@ -35,46 +28,38 @@ bool silt_barrier_contains(const silt_barrier *barrier, const double point[2]) {
     return false;
 }
 
-// ---- a set of cells by their three nodes
+// ---- a set of cells by their nodes
 
-typedef struct cell_set {
-    int *slot; // index + 1 of the cell, 0 empty
-    size_t mask;
-    const int *cell; // `stride` numbers a cell
-    int stride;
-} cell_set;
-
-static void cell_key(const int cell[3], int key[3]) {
-    int a = cell[0], b = cell[1], c = cell[2], t;
-    if (a > b)
-        t = a, a = b, b = t;
-    if (b > c)
-        t = b, b = c, c = t;
-    if (a > b)
-        t = a, a = b, b = t;
-    key[0] = a;
-    key[1] = b;
-    key[2] = c;
+static void cell_key(const int cell[4], int key[4]) {
+    memcpy(key, cell, 4 * sizeof *key);
+    for (int pair = 0; pair < 5; pair++) {
+        static const int network[5][2] = {{0, 1}, {2, 3}, {0, 2}, {1, 3}, {1, 2}};
+        const int p = network[pair][0], q = network[pair][1];
+        if (key[p] > key[q]) {
+            const int t = key[p];
+            key[p] = key[q];
+            key[q] = t;
+        }
+    }
 }
 
-static size_t cell_hash(const int key[3]) {
+static size_t cell_hash(const int key[4]) {
     uint64_t z = (uint64_t)(uint32_t)key[0] * 0x9e3779b97f4a7c15u ^ (uint64_t)(uint32_t)key[1] * 0xbf58476d1ce4e5b9u ^
-                 (uint64_t)(uint32_t)key[2] * 0x94d049bb133111ebu;
+                 (uint64_t)(uint32_t)key[2] * 0x94d049bb133111ebu ^ (uint64_t)(uint32_t)key[3] * 0xd6e8feb86659fd93u;
     z ^= z >> 29;
     return (size_t)(z * 0x9e3779b97f4a7c15u >> 17);
 }
 
-static void set_create(cell_set *set, int n, int stride, const int *cell) {
+void silt_cell_set_create(silt_cell_set *set, int n, const int (*cell)[4]) {
     size_t size = 16;
     while (size < 2 * (size_t)n + 2)
         size *= 2;
     set->slot = silt_alloc(size, sizeof *set->slot);
     set->mask = size - 1;
     set->cell = cell;
-    set->stride = stride;
     for (int e = 0; e < n; e++) {
-        int key[3];
-        cell_key(cell + stride * e, key);
+        int key[4];
+        cell_key(cell[e], key);
         size_t k = cell_hash(key) & set->mask;
         while (set->slot[k])
             k = (k + 1) & set->mask;
@@ -82,299 +67,515 @@ static void set_create(cell_set *set, int n, int stride, const int *cell) {
     }
 }
 
-// index of the cell in the set, or -1
-static int set_find(const cell_set *set, const int cell[3]) {
-    int key[3], other[3];
+int silt_cell_set_find(const silt_cell_set *set, const int cell[4]) {
+    int key[4], other[4];
     cell_key(cell, key);
     for (size_t k = cell_hash(key) & set->mask; set->slot[k]; k = (k + 1) & set->mask) {
-        cell_key(set->cell + set->stride * (set->slot[k] - 1), other);
-        if (other[0] == key[0] && other[1] == key[1] && other[2] == key[2])
+        cell_key(set->cell[set->slot[k] - 1], other);
+        if (memcmp(other, key, sizeof key) == 0)
             return set->slot[k] - 1;
     }
     return -1;
 }
 
-// three nodes on one straight wall make no cell
-static bool cell_on_wall(const silt_nodes *nodes, const int cell[3]) {
-    for (int s = 0; s < 2; s++) {
-        const int w = nodes->wall[cell[0]][s];
-        if (w >= 0 && (nodes->wall[cell[1]][0] == w || nodes->wall[cell[1]][1] == w) &&
-            (nodes->wall[cell[2]][0] == w || nodes->wall[cell[2]][1] == w))
-            return true;
-    }
-    return false;
+// ---- what a cell of the cloud is
+
+// nodes all on one patch of the walls make no cell where they lie flat on it
+static bool cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const silt_cell_shape *shape, double h) {
+    return silt_mesh_share(mesh, nodes, mesh->dim + 1, cell) && shape->height < CELL_FLAT * h;
 }
 
-static int cell_count_free(const silt_nodes *nodes, const int cell[3]) {
+static int cell_count_free(const silt_nodes *nodes, int n_corner, const int *cell) {
     int n = 0;
-    for (int a = 0; a < 3; a++)
+    for (int a = 0; a < n_corner; a++)
         n += nodes->kind[cell[a]] == NODE_FLUID && nodes->wall[cell[a]][0] < 0;
     return n;
 }
 
-// a gap that is nearly shut and still closing joins; the water in it is no more than the gap was wide
-static bool cell_closes(const silt_nodes *nodes, const int cell[3], double area, double gap) {
-    double longest = 0, rate = 0;
-    for (int a = 0; a < 3; a++) {
-        const int i = cell[a], j = cell[(a + 1) % 3], k = cell[(a + 2) % 3];
-        const double *p = nodes->x + 2 * j, *q = nodes->x + 2 * k;
-        longest = silt_max(longest, hypot(q[0] - p[0], q[1] - p[1]));
-        // twice the area changes with the velocity of i across the opposite edge
-        rate += nodes->v[2 * i] * (p[1] - q[1]) + nodes->v[2 * i + 1] * (q[0] - p[0]);
+static bool were_joined(const silt_mesh *mesh, int i, int j) {
+    if (i >= mesh->n_node || j >= mesh->n_node)
+        return false;
+    for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++)
+        if (mesh->neighbour[k] == j)
+            return true;
+    return false;
+}
+
+// How wide a gap a tetrahedron spans: a flat one may lie across a wide gap, so what counts is how far those of its corners are
+// apart that no edge of the water joins. `mesh` still has the adjacency of the old cells, `rim` the old boundary's facets.
+static double gap_width(const silt_mesh *mesh, const silt_cell_set *rim, const int *cell, const double *corner,
+                        const silt_cell_shape *shape) {
+    int group[4] = {0, 1, 2, 3}, n_group = 4, size[4] = {0};
+    double length[4][4];
+    for (int a = 0; a < 4; a++)
+        for (int b = 0; b < a; b++) {
+            double square = 0;
+            for (int d = 0; d < 3; d++)
+                square += silt_square(corner[3 * a + d] - corner[3 * b + d]);
+            length[a][b] = length[b][a] = sqrt(square);
+            if (group[a] != group[b] && were_joined(mesh, cell[a], cell[b])) {
+                const int from = group[a], to = group[b];
+                for (int c = 0; c < 4; c++)
+                    group[c] = group[c] == from ? to : group[c];
+                n_group--;
+            }
+        }
+    for (int a = 0; a < 4; a++)
+        size[group[a]]++;
+    if (n_group == 1) {
+        // a fold or a pit of one surface: two of its facets at least are the surface
+        int n_rim = 0;
+        for (int a = 0; a < 4; a++) {
+            int facet[4];
+            silt_cell_facet(3, cell, a, facet);
+            facet[3] = -1;
+            n_rim += silt_cell_set_find(rim, facet) >= 0;
+        }
+        return n_rim >= 2 ? shape->height : HUGE_VAL;
     }
-    return 2 * area < gap * longest && rate < 0;
+    for (int a = 0; a < 4 && n_group == 2; a++)
+        if (size[group[a]] == 1) { // a node before a facet
+            const double *p = corner + 3 * ((a + 1) % 4), *q = corner + 3 * ((a + 2) % 4), *r = corner + 3 * ((a + 3) % 4);
+            double square = 0;
+            for (int d = 0; d < 3; d++) {
+                const int m = (d + 1) % 3, n = (d + 2) % 3;
+                square += silt_square((q[m] - p[m]) * (r[n] - p[n]) - (q[n] - p[n]) * (r[m] - p[m]));
+            }
+            return 6 * shape->volume / sqrt(square);
+        }
+    if (n_group == 2) { // an edge before an edge, 0 and b before c and d
+        const int b = group[1] == group[0] ? 1 : group[2] == group[0] ? 2 : 3, c = b == 1 ? 2 : 1, d = 6 - b - c;
+        double u[3], v[3], w[3], n[3], uv = 0, nn = 0;
+        for (int k = 0; k < 3; k++) {
+            u[k] = (corner[3 * b + k] - corner[k]) / length[0][b];
+            v[k] = (corner[3 * d + k] - corner[3 * c + k]) / length[c][d];
+            w[k] = 0.5 * (corner[3 * c + k] + corner[3 * d + k] - corner[3 * b + k] - corner[k]);
+            uv += u[k] * v[k];
+        }
+        for (int k = 0; k < 3; k++) {
+            n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+            nn += n[k] * n[k];
+        }
+        double along = 0, wn = 0, ww = 0, mean = 0;
+        for (int k = 0; k < 3; k++) {
+            const double m = u[k] + (uv < 0 ? -v[k] : v[k]);
+            wn += w[k] * n[k];
+            ww += w[k] * w[k];
+            along += w[k] * m;
+            mean += m * m;
+        }
+        // crossing edges are as far apart as their lines, parallel ones as their middles across them
+        return nn > 0.1 ? fabs(wn) / sqrt(nn) : sqrt(silt_max(0, ww - along * along / mean));
+    }
+    // single nodes: the longest of the shortest links between them
+    double widest = 0;
+    bool reached[4] = {true, false, false, false};
+    for (int step = 0; step < 3; step++) {
+        int next = -1;
+        double shortest = HUGE_VAL;
+        for (int a = 0; a < 4; a++)
+            for (int b = 0; b < 4 && reached[a]; b++)
+                if (!reached[b] && (group[a] == group[b] ? 0 : length[a][b]) < shortest) {
+                    shortest = group[a] == group[b] ? 0 : length[a][b];
+                    next = b;
+                }
+        reached[next] = true;
+        widest = silt_max(widest, shortest);
+    }
+    return widest;
 }
 
-static bool cell_behind(const silt_nodes *nodes, const silt_barrier *barrier, const int cell[3]) {
-    if (cell_count_free(nodes, cell) >= 2)
-        return false; // only an edge between two fixed nodes can cut through something solid
-    double centre[2] = {0, 0};
-    for (int a = 0; a < 3; a++)
-        for (int d = 0; d < 2; d++)
-            centre[d] += nodes->x[2 * cell[a] + d] / 3;
-    return silt_barrier_contains(barrier, centre);
+// a gap that is nearly shut and still closing joins; the water in it is no more than the gap was wide
+static bool cell_closes(const silt_mesh *mesh, const silt_nodes *nodes, const silt_cell_set *rim, const int *cell,
+                        const double *corner, const silt_cell_shape *shape, double gap) {
+    if (shape->height >= gap || (mesh->dim == 3 && gap_width(mesh, rim, cell, corner, shape) >= gap))
+        return false;
+    // dim! times the volume changes with the velocity of every node across the facet opposite it
+    double rate = 0;
+    for (int a = 0; a <= mesh->dim; a++) {
+        const double *v = nodes->v + mesh->dim * cell[a];
+        if (mesh->dim == 2) {
+            const double *p = corner + 2 * ((a + 1) % 3), *q = corner + 2 * ((a + 2) % 3);
+            rate += v[0] * (p[1] - q[1]) + v[1] * (q[0] - p[0]);
+            continue;
+        }
+        static const int local[4] = {0, 1, 2, 3};
+        int side[3];
+        silt_cell_facet(3, local, a, side);
+        const double *p = corner + 3 * side[0], *q = corner + 3 * side[1], *r = corner + 3 * side[2];
+        for (int d = 0; d < 3; d++) {
+            const int m = (d + 1) % 3, n = (d + 2) % 3;
+            rate -= v[d] * ((q[m] - p[m]) * (r[n] - p[n]) - (q[n] - p[n]) * (r[m] - p[m]));
+        }
+    }
+    return rate < 0;
 }
 
-static silt_status cloud_triangles(const silt_nodes *nodes, const uint8_t *dead, int **triangle, int *n_triangle,
-                                   silt_error *err) {
-    const int n = nodes->count;
-    int *live = silt_alloc((size_t)n + 1, sizeof *live);
-    double *x = silt_alloc(2 * (size_t)n + 2, sizeof *x);
-    int m = 0;
+// a cell's middle, within the period
+static void cell_centre(const silt_mesh *mesh, const silt_scene *scene, const double *corner, double centre[3]) {
+    memset(centre, 0, 3 * sizeof *centre);
+    for (int a = 0; a <= mesh->dim; a++)
+        for (int d = 0; d < mesh->dim; d++)
+            centre[d] += corner[mesh->dim * a + d] / (mesh->dim + 1);
+    if (mesh->period[0] > 0)
+        centre[0] -= mesh->period[0] * floor((centre[0] - scene->period[0]) / mesh->period[0]);
+}
+
+static bool cell_behind(const silt_mesh *mesh, const silt_nodes *nodes, const silt_barrier *barrier, const int *cell,
+                        const double centre[3]) {
+    // only an edge between two fixed nodes can cut through something solid
+    return cell_count_free(nodes, mesh->dim + 1, cell) < mesh->dim && silt_barrier_contains(barrier, centre);
+}
+
+// ---- the cloud's triangulation
+
+static void mesh_prepare(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier) {
+    mesh->dim = silt_nodes_dim(nodes);
+    mesh->walls = barrier->walls;
+    mesh->period[0] = silt_max(0, scene->period[1] - scene->period[0]);
+    mesh->period[1] = mesh->period[2] = 0;
+}
+
+// Cells of the live nodes. Where x is periodic, nodes nearer to its ends than `margin` are put beyond the other end too, and
+// of the copies of a cell the one is kept in which its lowest node is no copy. Coordinates are whole parts of the period
+// then: both copies have the same numbers but for a whole shift, so that ties are broken alike in both.
+static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const uint8_t *dead,
+                               double margin, int (**cells)[4], int *n_cell, silt_error *err) {
+    const int n = nodes->count, dim = mesh->dim, n_corner = dim + 1;
+    const double period = mesh->period[0], parts = 17592186044416.0, scale = period > 0 ? parts / period : 1; // 2^44
+    int m = 0, room = 0, x_room = 0, *live = NULL;
+    double *x = NULL;
+    SILT_RESERVE(live, room, n + 1);
+    SILT_RESERVE(x, x_room, dim * n + 1);
     for (int i = 0; i < n; i++)
         if (!dead || !dead[i]) {
             live[m] = i;
-            x[2 * m] = nodes->x[2 * i];
-            x[2 * m + 1] = nodes->x[2 * i + 1];
+            for (int d = 0; d < dim; d++)
+                x[dim * m + d] = scale * nodes->x[dim * i + d];
+            if (period > 0) {
+                const double at = floor((nodes->x[dim * i] - scene->period[0]) / period * parts + 0.5);
+                x[dim * m] = at - parts * floor(at / parts);
+            }
             m++;
         }
-    const int failed = silt_delaunay_2d(m, x, triangle, n_triangle);
-    for (int k = 0; !failed && k < 3 * *n_triangle; k++)
-        (*triangle)[k] = live[(*triangle)[k]];
+    const int n_live = m;
+    for (int k = 0; period > 0 && k < n_live; k++)
+        for (int side = -1; side <= 1; side += 2) {
+            const double at = x[dim * k];
+            if (side > 0 ? at > margin * scale : at < parts - margin * scale)
+                continue;
+            SILT_RESERVE(live, room, m + 1);
+            SILT_RESERVE(x, x_room, dim * (m + 1));
+            live[m] = live[k];
+            memcpy(x + dim * m, x + dim * k, (size_t)dim * sizeof *x);
+            x[dim * m++] = at + side * parts;
+        }
+    int *found = NULL, n_found = 0, kept = 0;
+    const int failed = (dim == 3 ? silt_delaunay_3d : silt_delaunay_2d)(m, x, &found, &n_found);
+    *cells = NULL;
+    if (!failed)
+        *cells = silt_alloc((size_t)n_found + 1, sizeof **cells);
+    for (int e = 0; !failed && e < n_found; e++) {
+        const int *cell = found + n_corner * e;
+        int lowest = 0;
+        for (int a = 1; a < n_corner; a++)
+            if (live[cell[a]] < live[cell[lowest]])
+                lowest = a;
+        if (cell[lowest] >= n_live)
+            continue;
+        (*cells)[kept][3] = -1;
+        for (int a = 0; a < n_corner; a++)
+            (*cells)[kept][a] = live[cell[a]];
+        kept++;
+    }
+    *n_cell = kept;
+    free(found);
     free(live);
     free(x);
     return failed ? silt_fail(err, SILT_FAILED, "no memory for the triangulation of %d nodes", m) : SILT_OK;
 }
 
-static void mesh_push(silt_mesh *mesh, const int cell[3]) {
+static void draft_push(silt_draft *draft, const int cell[4], int before, double quality) {
+    silt_mesh *mesh = draft->mesh;
     SILT_RESERVE(mesh->cell, mesh->cell_capacity, mesh->n_cell + 1);
-    memcpy(mesh->cell[mesh->n_cell], cell, 3 * sizeof *cell);
-    mesh->cell[mesh->n_cell++][3] = -1;
+    SILT_RESERVE(draft->before, draft->before_capacity, mesh->n_cell + 1);
+    draft->before[mesh->n_cell] = before;
+    if (mesh->dim == 3) {
+        SILT_RESERVE(draft->quality, draft->quality_capacity, mesh->n_cell + 1);
+        draft->quality[mesh->n_cell] = quality;
+    }
+    memcpy(mesh->cell[mesh->n_cell++], cell, sizeof *mesh->cell);
 }
+
+static void draft_clear(silt_draft *draft) {
+    free(draft->before);
+    free(draft->quality);
+}
+
+// Slivers that can be reached from the open go, those within the water stay (without them there would be holes of no volume).
+// Through walls nothing is reached.
+static void peel_slivers(silt_draft *draft, const silt_nodes *nodes, const uint8_t *sliver) {
+    silt_mesh *mesh = draft->mesh;
+    const int n = mesh->n_cell;
+    int *stack = silt_alloc((size_t)n + 1, sizeof *stack), *index = silt_alloc((size_t)n + 1, sizeof *index), top = 0;
+    uint8_t *gone = silt_alloc((size_t)n + 1, 1), *held = silt_alloc((size_t)n + 1, 1);
+    // slivers that hang on no real cell are no water
+    for (int e = 0; e < n; e++)
+        if (!sliver[e])
+            for (int a = 0; a < 4; a++) {
+                const int other = mesh->across[e][a];
+                if (other >= 0 && sliver[other] && !held[other]) {
+                    held[other] = 1;
+                    stack[top++] = other;
+                }
+            }
+    while (top) {
+        const int e = stack[--top];
+        for (int a = 0; a < 4; a++) {
+            const int other = mesh->across[e][a];
+            if (other >= 0 && sliver[other] && !held[other]) {
+                held[other] = 1;
+                stack[top++] = other;
+            }
+        }
+    }
+    for (int e = 0; e < n; e++) {
+        bool open = sliver[e] && !held[e];
+        for (int a = 0; a < 4 && sliver[e] && !open; a++) {
+            int facet[3];
+            silt_cell_facet(3, mesh->cell[e], a, facet);
+            open = mesh->across[e][a] < 0 && silt_facet_kind_of(mesh, nodes, facet) == FACET_FREE;
+        }
+        if (open) {
+            gone[e] = 1;
+            stack[top++] = e;
+        }
+    }
+    while (top) {
+        const int e = stack[--top];
+        for (int a = 0; a < 4; a++) {
+            const int other = mesh->across[e][a];
+            int facet[3];
+            if (other < 0 || gone[other])
+                continue;
+            for (int b = 0; b < 4; b++)
+                if (mesh->across[other][b] == e)
+                    mesh->across[other][b] = -1;
+            silt_cell_facet(3, mesh->cell[e], a, facet);
+            if (sliver[other] && silt_facet_kind_of(mesh, nodes, facet) == FACET_FREE) {
+                gone[other] = 1;
+                stack[top++] = other;
+            }
+        }
+    }
+    int k = 0;
+    for (int e = 0; e < n; e++)
+        index[e] = gone[e] ? -1 : k++;
+    for (int e = 0; e < n; e++) {
+        if (gone[e])
+            continue;
+        const int to = index[e];
+        memmove(mesh->cell[to], mesh->cell[e], sizeof *mesh->cell);
+        draft->before[to] = draft->before[e];
+        draft->quality[to] = draft->quality[e];
+        for (int a = 0; a < 4; a++)
+            mesh->across[to][a] = mesh->across[e][a] < 0 ? -1 : index[mesh->across[e][a]];
+    }
+    mesh->n_cell = k;
+    free(stack);
+    free(index);
+    free(gone);
+    free(held);
+}
+
+// the chosen cells' neighbours; in 3-D slivers are taken off the surface and mended inside. @return flat cells left
+static int draft_finish(silt_draft *draft, const silt_nodes *nodes, const uint8_t *sliver, double size) {
+    silt_mesh *mesh = draft->mesh;
+    SILT_RESERVE(mesh->across, mesh->across_capacity, mesh->n_cell + 1);
+    silt_cells_across(mesh->dim, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
+    if (mesh->dim != 3)
+        return 0;
+    peel_slivers(draft, nodes, sliver);
+    return silt_mesh_heal(draft, nodes, size);
+}
+
+// ---- the first mesh
 
 silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
                             silt_error *err) {
-    int *triangle = NULL, n_triangle = 0;
-    SILT_TRY(cloud_triangles(nodes, NULL, &triangle, &n_triangle, err));
-    const double h = scene->fluid.size;
+    int (*cells)[4] = NULL, n_cells = 0, sliver_capacity = 0;
+    uint8_t *sliver = NULL;
+    mesh_prepare(mesh, nodes, scene, barrier);
+    const int dim = mesh->dim;
+    double largest = scene->fluid.size;
+    for (int i = 0; nodes->h && i < nodes->count; i++)
+        largest = silt_max(largest, nodes->h[i]);
+    SILT_TRY(cloud_cells(mesh, nodes, scene, NULL, 4 * scene->fluid.alpha * largest, &cells, &n_cells, err));
+    silt_draft draft = {.mesh = mesh};
     mesh->n_cell = 0;
-    for (int e = 0; e < n_triangle; e++) {
-        const int *cell = triangle + 3 * e;
-        const double area = silt_cell_area(nodes->x, cell);
-        if (area < 1e-6 * h * h || cell_on_wall(nodes, cell) || cell_behind(nodes, barrier, cell))
+    for (int e = 0; e < n_cells; e++) {
+        const int *cell = cells[e];
+        double corner[12], centre[3];
+        silt_cell_corners(mesh, nodes->x, cell, corner);
+        const silt_cell_shape shape = silt_cell_measure(dim, corner);
+        const double h = silt_cell_h(nodes, dim + 1, cell, scene->fluid.size);
+        const bool flat = dim == 3 && shape.height < CELL_FLAT * h;
+        if ((dim == 2 && shape.volume < 1e-6 * h * h) || cell_on_wall(mesh, nodes, cell, &shape, h))
             continue;
-        double centre[3] = {0};
-        for (int a = 0; a < 3; a++)
-            for (int d = 0; d < 2; d++)
-                centre[d] += nodes->x[2 * cell[a] + d] / 3;
+        cell_centre(mesh, scene, corner, centre);
+        if (cell_behind(mesh, nodes, barrier, cell, centre))
+            continue;
         bool in = false;
         for (int r = 0; r < scene->fluid.n_region && !in; r++)
             in = silt_region_contains(&scene->fluid.region[r], centre);
-        if (in && circumradius(nodes->x, cell, area) < 2 * scene->fluid.alpha * h)
-            mesh_push(mesh, cell);
+        if (!flat && !(in && shape.radius < 2 * scene->fluid.alpha * h))
+            continue;
+        SILT_RESERVE(sliver, sliver_capacity, mesh->n_cell + 1);
+        sliver[mesh->n_cell] = flat;
+        draft_push(&draft, cell, -1, shape.height / h);
     }
-    free(triangle);
-    silt_mesh_connect(mesh, nodes);
+    free(cells);
+    draft_finish(&draft, nodes, sliver, scene->fluid.size);
+    free(sliver);
+    draft_clear(&draft);
+    silt_mesh_connect_known(mesh, nodes);
     return SILT_OK;
 }
 
-// which triangles of the cloud are water now
-static void choose_cells(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
-                         const silt_memory *memory, const int *triangle, int n_triangle, uint8_t *kept) {
-    const double h = scene->fluid.size;
-    cell_set old, fresh;
-    set_create(&old, memory->n_cell, 4, memory->n_cell ? memory->cell[0] : NULL);
-    set_create(&fresh, n_triangle, 3, triangle);
+// ---- the next mesh
+
+// Which cells of the cloud are water now. @return largest circumradius of these, m
+static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
+                           const silt_memory *memory, const silt_cell_set *old, int (*const cells)[4], int n_cells,
+                           uint8_t **sliver) {
+    silt_mesh *mesh = draft->mesh;
+    const int dim = mesh->dim;
+    int sliver_capacity = 0;
+    double largest = 0;
 
     // old cells that the new triangulation has not: new cells in there are water too
-    silt_mesh gone = {0};
+    uint8_t *stays = silt_alloc((size_t)memory->n_cell + 1, 1);
+    int *before = silt_alloc((size_t)n_cells + 1, sizeof *before);
+    for (int e = 0; e < n_cells; e++) {
+        before[e] = silt_cell_set_find(old, cells[e]);
+        if (before[e] >= 0)
+            stays[before[e]] = 1;
+    }
+    silt_mesh gone = {.dim = dim};
+    memcpy(gone.period, mesh->period, sizeof gone.period);
     for (int e = 0; e < memory->n_cell; e++)
-        if (set_find(&fresh, memory->cell[e]) < 0)
-            mesh_push(&gone, memory->cell[e]);
+        if (!stays[e]) {
+            SILT_RESERVE(gone.cell, gone.cell_capacity, gone.n_cell + 1);
+            memcpy(gone.cell[gone.n_cell++], memory->cell[e], sizeof *gone.cell);
+        }
     silt_locator locator = {0};
-    silt_locator_build(&locator, &gone, nodes->x, h);
+    silt_locator_build(&locator, &gone, nodes->x, scene->fluid.size);
+    // the old surface, as cells without a fourth node
+    int (*facet)[4] = silt_alloc((size_t)mesh->n_facet + 1, sizeof *facet);
+    for (int k = 0; dim == 3 && k < mesh->n_facet; k++) {
+        memcpy(facet[k], mesh->facet[k], sizeof mesh->facet[k]);
+        facet[k][3] = -1;
+    }
+    silt_cell_set rim;
+    silt_cell_set_create(&rim, dim == 3 ? mesh->n_facet : 0, (const int(*)[4])facet);
 
     mesh->n_cell = 0;
-    memset(kept, 0, (size_t)memory->n_cell + 1);
-    for (int e = 0; e < n_triangle; e++) {
-        const int *cell = triangle + 3 * e;
-        const double area = silt_cell_area(nodes->x, cell);
-        if (area < 1e-9 * h * h || cell_on_wall(nodes, cell))
+    for (int e = 0; e < n_cells; e++) {
+        const int *cell = cells[e];
+        bool inner = true;
+        for (int a = 0; a <= dim; a++)
+            inner &= memory->interior[cell[a]];
+        double corner[12], centre[3];
+        silt_cell_corners(mesh, nodes->x, cell, corner);
+        const silt_cell_shape shape = silt_cell_measure(dim, corner);
+        const double h = silt_cell_h(nodes, dim + 1, cell, scene->fluid.size);
+        const bool flat = dim == 3 && shape.height < CELL_FLAT * h;
+        if ((dim == 2 && shape.volume < 1e-9 * h * h) || cell_on_wall(mesh, nodes, cell, &shape, h))
             continue;
-        const bool inner = memory->interior[cell[0]] && memory->interior[cell[1]] && memory->interior[cell[2]];
-        const double radius = circumradius(nodes->x, cell, area);
-        const int before = set_find(&old, cell);
-        bool keep = inner || radius < scene->fluid.alpha * h;
-        if (keep && before < 0 && !inner) {
-            double centre[2] = {0, 0}, weight[3];
+        bool keep = inner || flat || shape.radius < scene->fluid.alpha * h;
+        if (!keep)
+            continue;
+        cell_centre(mesh, scene, corner, centre);
+        if (before[e] < 0 && !inner && !flat) {
+            double weight[4];
             int n_fluid = 0;
-            for (int a = 0; a < 3; a++) {
+            for (int a = 0; a <= dim; a++)
                 n_fluid += nodes->kind[cell[a]] == NODE_FLUID || nodes->kind[cell[a]] == NODE_INLET;
-                for (int d = 0; d < 2; d++)
-                    centre[d] += nodes->x[2 * cell[a] + d] / 3;
-            }
             keep = silt_locate(&locator, &gone, nodes->x, centre, weight) >= 0 ||
-                   (n_fluid > 0 && cell_closes(nodes, cell, area, scene->fluid.merge * h));
+                   (n_fluid > 0 && cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
         }
-        if (!keep || cell_behind(nodes, barrier, cell))
+        if (!keep || cell_behind(mesh, nodes, barrier, cell, centre))
             continue;
-        mesh_push(mesh, cell);
-        if (before >= 0)
-            kept[before] = 1;
+        if (dim == 3) {
+            SILT_RESERVE(*sliver, sliver_capacity, mesh->n_cell + 1);
+            (*sliver)[mesh->n_cell] = flat;
+        }
+        if (!flat)
+            largest = silt_max(largest, shape.radius);
+        draft_push(draft, cell, before[e], shape.height / h);
     }
     silt_mesh_clear(&gone);
     silt_locator_clear(&locator);
-    free(old.slot);
-    free(fresh.slot);
-}
-
-// Volume is booked where it changed: a group is the nodes of cells that came or went together, so that a mere flip of an
-// edge books nothing. A node that lost all its cells takes its share along as it flies.
-static void book_volume(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, const uint8_t *kept,
-                        const uint8_t *was_wet) {
-    const int n = nodes->count;
-    int *parent = silt_alloc((size_t)n + 1, sizeof *parent);
-    double *sum = silt_alloc((size_t)n + 1, sizeof *sum), *share = silt_alloc((size_t)n + 1, sizeof *share);
-    int *members = silt_alloc((size_t)n + 1, sizeof *members);
-    uint8_t *wet = silt_alloc((size_t)n + 1, 1), *touched = silt_alloc((size_t)n + 1, 1);
-    for (int i = 0; i < n; i++)
-        parent[i] = i;
-    cell_set old;
-    set_create(&old, memory->n_cell, 4, memory->n_cell ? memory->cell[0] : NULL);
-
-    double made = 0;
-    for (int e = 0; e < memory->n_cell; e++)
-        if (!kept[e])
-            silt_group_join(parent, memory->cell[e]);
-    for (int e = 0; e < mesh->n_cell; e++)
-        if (set_find(&old, mesh->cell[e]) < 0)
-            silt_group_join(parent, mesh->cell[e]);
-    for (int e = 0; e < memory->n_taken; e++)
-        silt_group_join(parent, memory->taken[e]);
-
-    // what every group lost less what it got
-    for (int e = 0; e < memory->n_cell; e++)
-        if (!kept[e]) {
-            sum[silt_group_find(parent, memory->cell[e][0])] += memory->area[e];
-            made -= memory->area[e];
-            for (int a = 0; a < 3; a++) {
-                share[memory->cell[e][a]] += memory->area[e] / 3;
-                touched[memory->cell[e][a]] = 1;
-            }
-        }
-    for (int e = 0; e < memory->n_taken; e++) {
-        sum[silt_group_find(parent, memory->taken[e][0])] -= memory->taken_area[e];
-        made += memory->taken_area[e];
-        touched[memory->taken[e][0]] = 1;
-    }
-    for (int e = 0; e < mesh->n_cell; e++) {
-        const int before = set_find(&old, mesh->cell[e]);
-        const double area = silt_cell_area(nodes->x, mesh->cell[e]);
-        for (int a = 0; a < 3; a++)
-            wet[mesh->cell[e][a]] = 1;
-        if (before < 0) {
-            sum[silt_group_find(parent, mesh->cell[e][0])] -= area;
-            made += area;
-            for (int a = 0; a < 3; a++)
-                touched[mesh->cell[e][a]] = 1;
-        } else { // nodes that were put on a wall or a body moved the cell's rim
-            const double moved = area - memory->area[before];
-            made += moved;
-            for (int a = 0; a < 3; a++)
-                nodes->debt[mesh->cell[e][a]] -= moved / 3;
-        }
-    }
-
-    // debts of nodes that left or came back go into their group; a node that flies off takes its share
-    for (int i = 0; i < n; i++) {
-        const int g = silt_group_find(parent, i);
-        if (memory->dead[i] || (wet[i] && !was_wet[i])) {
-            sum[g] += nodes->debt[i];
-            nodes->debt[i] = 0;
-            touched[i] = 1;
-        } else if (!wet[i] && was_wet[i] && nodes->kind[i] == NODE_FLUID) {
-            nodes->debt[i] += share[i];
-            sum[g] -= share[i];
-            touched[i] = 1;
-        }
-    }
-    // where nodes left the domain, what is missing left with them
-    memory->left = 0;
-    for (int i = 0; i < n; i++)
-        if (memory->dead[i] == NODE_LEFT) {
-            const int g = silt_group_find(parent, i);
-            memory->left += sum[g];
-            sum[g] = 0;
-        }
-    memory->reconnected = made + memory->left;
-    for (int i = 0; i < n; i++)
-        if (touched[i] && wet[i] && !memory->dead[i])
-            members[silt_group_find(parent, i)]++;
-    for (int i = 0; i < n; i++) {
-        const int g = silt_group_find(parent, i);
-        if (touched[i] && wet[i] && !memory->dead[i])
-            nodes->debt[i] += sum[g] / members[g];
-    }
-    // a group without a wet node left: its volume flies with its live nodes, or goes to the nearest wet node
-    for (int i = 0; i < n; i++) {
-        const int g = silt_group_find(parent, i);
-        if (g != i || members[g] || sum[g] == 0)
-            continue;
-        int heir = -1;
-        double nearest = HUGE_VAL;
-        for (int k = 0; k < n; k++) {
-            if (memory->dead[k])
-                continue;
-            const bool own = silt_group_find(parent, k) == g && nodes->kind[k] == NODE_FLUID;
-            if (!own && !wet[k])
-                continue;
-            const double distance = own ? -1 : hypot(nodes->x[2 * k] - nodes->x[2 * i], nodes->x[2 * k + 1] - nodes->x[2 * i + 1]);
-            if (distance < nearest) {
-                nearest = distance;
-                heir = k;
-            }
-        }
-        if (heir >= 0)
-            nodes->debt[heir] += sum[g];
-    }
-    free(old.slot);
-    free(parent);
-    free(sum);
-    free(share);
-    free(members);
-    free(wet);
-    free(touched);
+    free(rim.slot);
+    free(facet);
+    free(stays);
+    free(before);
+    return largest;
 }
 
 silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
                               silt_memory *memory, int *map, silt_error *err) {
     silt_memory_extend(memory, nodes->count);
-    int *triangle = NULL, n_triangle = 0;
-    SILT_TRY(cloud_triangles(nodes, memory->dead, &triangle, &n_triangle, err));
-    uint8_t *kept = silt_alloc((size_t)memory->n_cell + 1, 1), *was_wet = silt_alloc((size_t)nodes->count + 1, 1);
+    mesh_prepare(mesh, nodes, scene, barrier);
+    const int dim = mesh->dim;
+    const double period = mesh->period[0];
+    double h = scene->fluid.size;
+    for (int i = 0; nodes->h && i < nodes->count; i++)
+        h = silt_max(h, nodes->h[i]);
+    for (int i = 0; period > 0 && i < nodes->count; i++) {
+        double *x = nodes->x + dim * i;
+        if (x[0] < scene->period[0] || x[0] >= scene->period[1])
+            x[0] -= period * floor((x[0] - scene->period[0]) / period);
+        if (x[0] >= scene->period[1]) // rounding
+            x[0] = scene->period[0];
+    }
+    silt_cell_set old;
+    silt_cell_set_create(&old, memory->n_cell, (const int(*)[4])memory->cell);
+    silt_draft draft = {.mesh = mesh};
+    uint8_t *sliver = NULL;
+    // copies beyond a periodic border must reach as far as the largest empty sphere of the water
+    for (double margin = 3 * scene->fluid.alpha * h;; margin *= 2) {
+        int (*cells)[4] = NULL, n_cells = 0;
+        const silt_status status = cloud_cells(mesh, nodes, scene, memory->dead, margin, &cells, &n_cells, err);
+        if (status != SILT_OK) {
+            free(old.slot);
+            free(sliver);
+            draft_clear(&draft);
+            return status;
+        }
+        free(sliver);
+        sliver = NULL;
+        const double largest = choose_cells(&draft, nodes, scene, barrier, memory, &old, cells, n_cells, &sliver);
+        free(cells);
+        if (period <= 0 || 2 * largest <= margin || margin >= period)
+            break;
+    }
+    memory->flat = draft_finish(&draft, nodes, sliver, scene->fluid.size);
+
+    uint8_t *was_wet = silt_alloc((size_t)nodes->count + 1, 1);
     for (int e = 0; e < memory->n_cell; e++)
-        for (int a = 0; a < 3; a++)
+        for (int a = 0; a <= dim; a++)
             was_wet[memory->cell[e][a]] = 1;
-    choose_cells(mesh, nodes, scene, barrier, memory, triangle, n_triangle, kept);
-    book_volume(mesh, nodes, memory, kept, was_wet);
-    free(triangle);
-    free(kept);
+    silt_book_volume(&draft, nodes, memory, &old, was_wet, scene->fluid.size);
     free(was_wet);
+    free(old.slot);
+    free(sliver);
+    draft_clear(&draft);
 
     silt_nodes_compact(nodes, memory->dead, map);
     for (int e = 0; e < mesh->n_cell; e++)
-        for (int a = 0; a < 3; a++)
+        for (int a = 0; a <= dim; a++)
             mesh->cell[e][a] = map[mesh->cell[e][a]];
-    silt_mesh_connect(mesh, nodes);
+    silt_mesh_connect_known(mesh, nodes);
     return SILT_OK;
 }

@@ -525,7 +525,8 @@ static void run_free(silt_run *run) {
     free(run->log);
 }
 
-static void run_begin(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock) {
+static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock,
+                             silt_error *err) {
     *run = (silt_run){.scene = scene, .def = *def, .saved_step = -1, .lock = lock};
     run->out = silt_text("%s", out);
     run->log = silt_text("%s/dem.log", out);
@@ -536,9 +537,10 @@ static void run_begin(silt_run *run, const silt_scene *scene, const silt_run_def
         omp_set_num_threads(def->threads);
     run->nodes.dim = run->mesh.dim = scene->dimension;
     run->mesh.period[0] = scene->period[1] - scene->period[0];
-    silt_walls_create(&run->walls, scene);
-    silt_run_box(run);
     run->gauge = silt_alloc((size_t)silt_gauges_count(scene) + 1, sizeof *run->gauge);
+    SILT_TRY(silt_walls_create(&run->walls, scene, err));
+    silt_run_box(run);
+    return SILT_OK;
 }
 
 // ---------------------------------------------------------------- the loop
@@ -630,9 +632,10 @@ silt_status silt_scene_run(const silt_scene *scene, const silt_run_def *def, sil
     char *out = def->out ? silt_text("%s", def->out) : silt_folder_default(scene);
     silt_status status = silt_folder_prepare(out, def->force, &lock, err);
     if (status == SILT_OK) {
-        run_begin(&run, scene, def, out, lock);
+        status = run_begin(&run, scene, def, out, lock, err);
         signals_catch();
-        status = run_start(&run, err);
+        if (status == SILT_OK)
+            status = run_start(&run, err);
         if (status == SILT_OK)
             status = run_loop(&run, err);
         status = run_close(&run, status, err);
@@ -678,10 +681,13 @@ static silt_status resume_load(silt_run *run, const silt_scene *scene, const sil
         if (step[k] < 0)
             break;
         silt_store *store = NULL;
-        run_begin(run, scene, def, def->out, -1);
-        status = silt_store_open(&store, path[k], &why[k]);
+        status = run_begin(run, scene, def, def->out, -1, &why[k]);
+        if (status == SILT_OK)
+            status = silt_store_open(&store, path[k], &why[k]);
         if (status == SILT_OK)
             status = silt_run_load(run, store, &why[k]);
+        if (status == SILT_OK)
+            silt_walls_move(&run->walls, scene, run->time, 0);
         silt_store_close(&store);
         if (status != SILT_OK) {
             run_free(run);

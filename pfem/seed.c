@@ -191,15 +191,14 @@ static void seed_inlets(seed *s) {
 
 // corners of the tank that point into the water
 static void seed_corners(seed *s) {
-    const silt_walls *walls = s->walls;
-    for (int a = 0; a < walls->count; a++) {
-        const int b = walls->next[a];
-        if (b < 0)
-            continue;
-        const double sine = walls->normal[a][0] * walls->normal[b][1] - walls->normal[a][1] * walls->normal[b][0];
-        if (sine < -1e-3 && !seed_crowded(s, walls->to[a], 1e-6 * s->h))
-            seed_add(s, NODE_CORNER, a, walls->to[a]);
-    }
+    double *point;
+    int(*element)[3];
+    const int n = silt_walls_ridges(s->walls, s->h, &point, &element);
+    for (int k = 0; k < n; k++)
+        if (!seed_crowded(s, point + 3 * k, 1e-6 * s->h))
+            seed_add(s, NODE_CORNER, element[k][0], point + 3 * k);
+    free(point);
+    free(element);
 }
 
 void silt_nodes_seed(silt_nodes *nodes, const silt_scene *scene, const silt_walls *walls, silt_solid_test solid,

@@ -30,7 +30,7 @@ static void bench_open(bench *b, const char *format, ...) {
     if (silt_scene_read(path, 0, NULL, &b->scene, &err) != SILT_OK)
         fail_msg("%s", err.text);
     unlink(path);
-    silt_walls_create(&b->walls, b->scene);
+    silt_walls_create(&b->walls, b->scene, NULL);
     silt_nodes_seed(&b->nodes, b->scene, &b->walls, NULL, NULL);
     const silt_barrier barrier = {.walls = &b->walls};
     assert_int_equal(silt_mesh_first(&b->mesh, &b->nodes, b->scene, &barrier, &err), SILT_OK);

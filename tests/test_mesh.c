@@ -37,7 +37,7 @@ typedef struct bench {
 
 static void bench_open(bench *b, const char *text) {
     *b = (bench){.scene = scene_of(text)};
-    silt_walls_create(&b->walls, b->scene);
+    silt_walls_create(&b->walls, b->scene, NULL);
     b->barrier.walls = &b->walls;
     silt_nodes_seed(&b->nodes, b->scene, &b->walls, NULL, NULL);
     silt_error err = {0};

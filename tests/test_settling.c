@@ -205,7 +205,7 @@ static void test_water_and_grain_together(void **unused) {
         run.box_lo[d] = scene->fluid.region[0].lo[d] - 0.03;
         run.box_hi[d] = scene->fluid.region[0].hi[d] + 0.03;
     }
-    silt_walls_create(&run.walls, scene);
+    silt_walls_create(&run.walls, scene, NULL);
     run.barrier.walls = &run.walls;
     silt_coupling_def def;
     silt_coupling_def_fill(&run, &def);

@@ -1,0 +1,355 @@
+// slivers: four nodes nearly in a plane, which the Delaunay criterion lets pass, taken out by local exchanges of tetrahedra
+#include "remesh.h"
+
+#define HEAL_BELOW 0.12 // cells with a smaller height than this times h are tried
+#define HEAL_RING 8     // an edge with more cells around it is left alone
+#define HEAL_PASSES 6
+#define HEAL_CELLS (2 * HEAL_RING)
+
+typedef struct healer {
+    silt_draft *draft;
+    silt_mesh *mesh;
+    const silt_nodes *nodes;
+    double size;
+    int *spare; // slots of cells that are gone
+    int n_spare, spare_capacity, tried_capacity;
+    uint8_t *tried; // one per cell: nothing can be done about it as long as its neighbours stay
+} healer;
+
+// the nodes that an exchange is about, about the first of them
+typedef struct patch {
+    int node[HEAL_RING + 2];
+    double x[HEAL_RING + 2][3];
+    double h[HEAL_RING + 2];
+} patch;
+
+static void patch_put(const healer *s, patch *p, int k, int node) {
+    p->node[k] = node;
+    p->h[k] = silt_node_h(s->nodes, node, s->size);
+    for (int d = 0; d < 3; d++) {
+        double step = s->nodes->x[3 * node + d] - s->nodes->x[3 * p->node[0] + d];
+        if (s->mesh->period[d] > 0)
+            step -= s->mesh->period[d] * floor(step / s->mesh->period[d] + 0.5);
+        p->x[k][d] = step;
+    }
+}
+
+static double patch_quality(const patch *p, int a, int b, int c, int d) {
+    double corner[12];
+    memcpy(corner, p->x[a], sizeof p->x[a]);
+    memcpy(corner + 3, p->x[b], sizeof p->x[b]);
+    memcpy(corner + 6, p->x[c], sizeof p->x[c]);
+    memcpy(corner + 9, p->x[d], sizeof p->x[d]);
+    return silt_cell_measure(3, corner).height * 4 / (p->h[a] + p->h[b] + p->h[c] + p->h[d]);
+}
+
+// what is best done about a cell
+typedef struct remedy {
+    int n_old, n_new;
+    int old[HEAL_RING];
+    int fresh[HEAL_CELLS][4];
+    double quality[HEAL_CELLS];
+    double gain; // smallest quality after less before
+    double cost; // sum of 1/quality after less before: decides where the worst cell is the same
+} remedy;
+
+#define HEAL_TIE 1e-10 // qualities closer than this are the same: rounding must not decide
+
+static bool better(double value, double cost, double than, double than_cost) {
+    return value > than + HEAL_TIE || (value > than - HEAL_TIE && cost < than_cost - HEAL_TIE);
+}
+
+// cells and nodes around the edge a-b, starting at cell e; false: it lies on the boundary, or the ring is too long
+static bool ring_walk(const healer *s, int e, const int corner[4], int *ring, int *cell, int *n) {
+    const silt_mesh *mesh = s->mesh;
+    const int a = mesh->cell[e][corner[0]], b = mesh->cell[e][corner[1]];
+    int from = mesh->cell[e][corner[2]], to = mesh->cell[e][corner[3]], at = e;
+    *n = 0;
+    do {
+        if (*n == HEAL_RING)
+            return false;
+        ring[*n] = from;
+        cell[(*n)++] = at;
+        int k = 0;
+        while (mesh->cell[at][k] != from)
+            k++;
+        at = mesh->across[at][k];
+        if (at < 0)
+            return false;
+        from = to;
+        for (int m = 0; m < 4; m++)
+            if (mesh->cell[at][m] != a && mesh->cell[at][m] != b && mesh->cell[at][m] != from)
+                to = mesh->cell[at][m];
+    } while (at != e);
+    return *n >= 3;
+}
+
+// Takes out the edge: the polygon of its ring is divided into triangles, each with one tetrahedron on either side, so that
+// the worst is as good as can be (Klincsek's dynamic programme).
+static void try_edge(const healer *s, int e, const int corner[4], remedy *best) {
+    int ring[HEAL_RING], cell[HEAL_RING], n;
+    if (!ring_walk(s, e, corner, ring, cell, &n))
+        return;
+    patch p;
+    patch_put(s, &p, 0, s->mesh->cell[e][corner[0]]);
+    patch_put(s, &p, 1, s->mesh->cell[e][corner[1]]);
+    double before = HUGE_VAL, cost_before = 0;
+    for (int k = 0; k < n; k++) {
+        patch_put(s, &p, 2 + k, ring[k]);
+        before = silt_min(before, s->draft->quality[cell[k]]);
+        cost_before += 1 / silt_max(s->draft->quality[cell[k]], HEAL_TIE);
+    }
+    const double bar = before + best->gain - HEAL_TIE;
+    double worst[HEAL_RING][HEAL_RING], cost[HEAL_RING][HEAL_RING], upper[HEAL_RING][HEAL_RING], lower[HEAL_RING][HEAL_RING];
+    int split[HEAL_RING][HEAL_RING];
+    for (int i = 0; i + 1 < n; i++) {
+        worst[i][i + 1] = HUGE_VAL;
+        cost[i][i + 1] = 0;
+    }
+    for (int span = 2; span < n; span++)
+        for (int i = 0; i + span < n; i++) {
+            const int j = i + span;
+            worst[i][j] = -1;
+            cost[i][j] = HUGE_VAL;
+            for (int k = i + 1; k < j; k++) {
+                const double least = silt_max(worst[i][j] - HEAL_TIE, bar);
+                double value = silt_min(worst[i][k], worst[k][j]);
+                if (value <= least)
+                    continue;
+                const double over = patch_quality(&p, 2 + i, 2 + k, 2 + j, 1);
+                if (over <= least)
+                    continue;
+                const double under = patch_quality(&p, 2 + i, 2 + j, 2 + k, 0);
+                if (under <= least)
+                    continue;
+                value = silt_min(value, silt_min(over, under));
+                const double sum = cost[i][k] + cost[k][j] + 1 / over + 1 / under;
+                if (better(value, sum, worst[i][j], cost[i][j])) {
+                    worst[i][j] = value;
+                    cost[i][j] = sum;
+                    split[i][j] = k;
+                    upper[i][j] = over;
+                    lower[i][j] = under;
+                }
+            }
+        }
+    const double gain = worst[0][n - 1] - before, more = cost[0][n - 1] - cost_before;
+    if (gain <= HEAL_TIE || !better(gain, more, best->gain, best->cost))
+        return;
+    best->gain = gain;
+    best->cost = more;
+    best->n_old = n;
+    memcpy(best->old, cell, sizeof cell);
+    best->n_new = 0;
+    int stack[HEAL_RING][2] = {{0, n - 1}}, top = 1;
+    while (top) {
+        top--;
+        const int i = stack[top][0], j = stack[top][1], k = split[i][j], m = best->n_new;
+        best->n_new += 2;
+        memcpy(best->fresh[m], (const int[4]){ring[i], ring[k], ring[j], p.node[1]}, sizeof best->fresh[m]);
+        memcpy(best->fresh[m + 1], (const int[4]){ring[i], ring[j], ring[k], p.node[0]}, sizeof best->fresh[m]);
+        best->quality[m] = upper[i][j];
+        best->quality[m + 1] = lower[i][j];
+        const int part[2][2] = {{i, k}, {k, j}};
+        for (int q = 0; q < 2; q++)
+            if (part[q][1] - part[q][0] > 1)
+                memcpy(stack[top++], part[q], sizeof part[q]);
+    }
+}
+
+// takes out the facet opposite node a: three cells around the line between the two nodes that faced each other across it
+static void try_facet(const healer *s, int e, int a, remedy *best) {
+    const silt_mesh *mesh = s->mesh;
+    const int f = mesh->across[e][a];
+    if (f < 0)
+        return;
+    int facet[3], far = -1;
+    silt_cell_facet(3, mesh->cell[e], a, facet);
+    for (int k = 0; k < 4; k++)
+        if (mesh->across[f][k] == e)
+            far = mesh->cell[f][k];
+    patch p;
+    patch_put(s, &p, 0, mesh->cell[e][a]);
+    patch_put(s, &p, 1, far);
+    for (int k = 0; k < 3; k++)
+        patch_put(s, &p, 2 + k, facet[k]);
+    const double q[2] = {s->draft->quality[e], s->draft->quality[f]}, before = silt_min(q[0], q[1]);
+    double quality[3], more = -1 / silt_max(q[0], HEAL_TIE) - 1 / silt_max(q[1], HEAL_TIE);
+    for (int k = 0; k < 3; k++) {
+        quality[k] = patch_quality(&p, 2 + k, 2 + (k + 1) % 3, 0, 1);
+        if (quality[k] <= before + best->gain - HEAL_TIE)
+            return;
+        more += 1 / quality[k];
+    }
+    const double gain = silt_min(quality[0], silt_min(quality[1], quality[2])) - before;
+    if (gain <= HEAL_TIE || !better(gain, more, best->gain, best->cost))
+        return;
+    best->gain = gain;
+    best->cost = more;
+    best->n_old = 2;
+    best->old[0] = e;
+    best->old[1] = f;
+    best->n_new = 3;
+    for (int k = 0; k < 3; k++) {
+        memcpy(best->fresh[k], (const int[4]){facet[k], facet[(k + 1) % 3], p.node[0], p.node[1]}, sizeof best->fresh[k]);
+        best->quality[k] = quality[k];
+    }
+}
+
+// a facet without its turn: equal for both cells that have it
+static void facet_key(const int *cell, int a, int key[3]) {
+    silt_cell_facet(3, cell, a, key);
+    for (int pass = 0; pass < 3; pass++) {
+        const int k = pass % 2, t = key[k];
+        if (key[k] > key[k + 1]) {
+            key[k] = key[k + 1];
+            key[k + 1] = t;
+        }
+    }
+}
+
+static void remedy_apply(healer *s, const remedy *r) {
+    silt_mesh *mesh = s->mesh;
+    silt_draft *draft = s->draft;
+    // facets around the cavity, and the cells beyond
+    struct half {
+        int key[3], cell, side;
+    } rim[4 * HEAL_CELLS];
+    int n_rim = 0, slot[HEAL_CELLS];
+    for (int k = 0; k < r->n_old; k++)
+        for (int a = 0; a < 4; a++) {
+            const int other = mesh->across[r->old[k]][a];
+            bool inside = false;
+            for (int m = 0; m < r->n_old; m++)
+                inside |= r->old[m] == other;
+            if (inside)
+                continue;
+            struct half *h = &rim[n_rim++];
+            facet_key(mesh->cell[r->old[k]], a, h->key);
+            h->cell = other;
+            h->side = -1;
+            for (int b = 0; other >= 0 && b < 4; b++)
+                if (mesh->across[other][b] == r->old[k])
+                    h->side = b;
+        }
+    for (int k = 0; k < r->n_new; k++) {
+        if (k < r->n_old)
+            slot[k] = r->old[k];
+        else if (s->n_spare)
+            slot[k] = s->spare[--s->n_spare];
+        else {
+            slot[k] = mesh->n_cell++;
+            SILT_RESERVE(mesh->cell, mesh->cell_capacity, mesh->n_cell);
+            SILT_RESERVE(mesh->across, mesh->across_capacity, mesh->n_cell);
+            SILT_RESERVE(draft->before, draft->before_capacity, mesh->n_cell);
+            SILT_RESERVE(draft->quality, draft->quality_capacity, mesh->n_cell);
+            SILT_RESERVE(s->tried, s->tried_capacity, mesh->n_cell);
+        }
+    }
+    for (int k = r->n_new; k < r->n_old; k++) {
+        SILT_RESERVE(s->spare, s->spare_capacity, s->n_spare + 1);
+        s->spare[s->n_spare++] = r->old[k];
+        draft->quality[r->old[k]] = HUGE_VAL;
+        mesh->cell[r->old[k]][0] = -1;
+    }
+    for (int k = 0; k < r->n_new; k++) {
+        memcpy(mesh->cell[slot[k]], r->fresh[k], sizeof r->fresh[k]);
+        draft->quality[slot[k]] = r->quality[k];
+        draft->before[slot[k]] = -2;
+        s->tried[slot[k]] = 0;
+    }
+    // every facet of the new cells is on the rim or has its partner among the new cells
+    for (int k = 0; k < r->n_new; k++)
+        for (int a = 0; a < 4; a++) {
+            int key[3], m = 0;
+            facet_key(r->fresh[k], a, key);
+            while (m < n_rim && memcmp(rim[m].key, key, sizeof key) != 0)
+                m++;
+            if (m == n_rim) {
+                struct half *h = &rim[n_rim++];
+                memcpy(h->key, key, sizeof key);
+                h->cell = slot[k];
+                h->side = a;
+                continue;
+            }
+            mesh->across[slot[k]][a] = rim[m].cell;
+            if (rim[m].cell >= 0) {
+                mesh->across[rim[m].cell][rim[m].side] = slot[k];
+                s->tried[rim[m].cell] = 0;
+            }
+        }
+}
+
+typedef struct patient {
+    double quality;
+    int cell;
+} patient;
+
+static int patient_worse(const void *a, const void *b) {
+    const patient *p = a, *q = b;
+    return p->quality != q->quality ? (p->quality > q->quality) - (p->quality < q->quality) : (p->cell > q->cell) - (p->cell < q->cell);
+}
+
+static void heal_cell(healer *s, int e) {
+    // corners of the edge first, so that all four stand as the cell's nodes do
+    static const int edge[6][4] = {{0, 1, 2, 3}, {0, 2, 3, 1}, {0, 3, 1, 2}, {1, 2, 0, 3}, {1, 3, 2, 0}, {2, 3, 0, 1}};
+    remedy best = {.gain = 0};
+    for (int k = 0; k < 6; k++)
+        try_edge(s, e, edge[k], &best);
+    for (int a = 0; a < 4; a++)
+        try_facet(s, e, a, &best);
+    if (best.n_new)
+        remedy_apply(s, &best);
+    else
+        s->tried[e] = 1;
+}
+
+int silt_mesh_heal(silt_draft *draft, const silt_nodes *nodes, double size) {
+    silt_mesh *mesh = draft->mesh;
+    healer s = {.draft = draft, .mesh = mesh, .nodes = nodes, .size = size};
+    SILT_RESERVE(s.tried, s.tried_capacity, mesh->n_cell + 1);
+    patient *list = NULL;
+    int list_capacity = 0;
+    for (int pass = 0; pass < HEAL_PASSES; pass++) {
+        int n = 0;
+        for (int e = 0; e < mesh->n_cell; e++)
+            if (draft->quality[e] < HEAL_BELOW && !s.tried[e]) {
+                SILT_RESERVE(list, list_capacity, n + 1);
+                list[n++] = (patient){draft->quality[e], e};
+            }
+        if (n == 0)
+            break;
+        // the worst first: the outcome hangs on the places of the nodes, not on their numbers
+        qsort(list, (size_t)n, sizeof *list, patient_worse);
+        for (int k = 0; k < n; k++)
+            if (draft->quality[list[k].cell] == list[k].quality && mesh->cell[list[k].cell][0] >= 0)
+                heal_cell(&s, list[k].cell);
+    }
+    // the last cells fill the free slots
+    int n_flat = 0, last = mesh->n_cell;
+    for (int k = 0; k < s.n_spare; k++) {
+        while (last > 0 && mesh->cell[last - 1][0] < 0)
+            last--;
+        const int to = s.spare[k], from = last - 1;
+        if (to >= last)
+            continue;
+        memcpy(mesh->cell[to], mesh->cell[from], sizeof *mesh->cell);
+        memcpy(mesh->across[to], mesh->across[from], sizeof *mesh->across);
+        draft->before[to] = draft->before[from];
+        draft->quality[to] = draft->quality[from];
+        for (int a = 0; a < 4; a++)
+            for (int b = 0; mesh->across[to][a] >= 0 && b < 4; b++)
+                if (mesh->across[mesh->across[to][a]][b] == from)
+                    mesh->across[mesh->across[to][a]][b] = to;
+        last--;
+    }
+    while (last > 0 && mesh->cell[last - 1][0] < 0)
+        last--;
+    mesh->n_cell = last;
+    for (int e = 0; e < mesh->n_cell; e++)
+        n_flat += draft->quality[e] < CELL_FLAT;
+    free(list);
+    free(s.spare);
+    free(s.tried);
+    return n_flat;
+}
