@@ -330,7 +330,8 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             silt_assemble_projection(f, s->mesh, p);
         const double stiff = stiffness(f, s);
         momentum_right(f, s, p, f->force);
-        if (f->iterations < FLUID_REFRESH)
+        const bool refresh = (first && stiff <= FLUID_STIFF) || f->iterations < FLUID_REFRESH;
+        if (refresh)
             find_excess(f, s, f->force);
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
@@ -378,7 +379,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             p[i] += f->increment[i];
         if (stiff > FLUID_STIFF)
             silt_mix_next(f->mix, D, f->n_node, f->increment, f->residual, p, f->w);
-        if ((first && stiff <= FLUID_STIFF) || f->iterations < FLUID_REFRESH)
+        if (refresh)
             silt_assemble_projection(f, s->mesh, p);
         f->seconds_assemble += silt_seconds() - tick;
     }
