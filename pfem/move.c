@@ -311,7 +311,14 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     const double middle = silt_seconds();
     run->phase[PHASE_move] += middle - since;
     SILT_RESERVE(run->map, run->map_capacity, nodes->count + 1);
+    SILT_RESERVE(run->v_before, run->v_before_capacity, D * (nodes->count + 1));
+    SILT_RESERVE(run->debt_before, run->debt_before_capacity, nodes->count + 1);
+    memcpy(run->v_before, nodes->v, (size_t)(D * nodes->count) * sizeof(double));
+    memcpy(run->debt_before, nodes->debt, (size_t)nodes->count * sizeof(double));
+    run->memory.record = true;
     SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
+    double lost[3];
+    silt_momentum_hand_on(&run->memory, mesh, nodes, rho, NULL, run->debt_before, run->v_before, run->map, lost);
     run->ledger.volume_reconnected += run->memory.reconnected;
     // without an outlet nothing may leave: what does anyway shows as a volume error
     if (scene->fluid.n_outlet)

@@ -532,6 +532,7 @@ static void run_free(silt_run *run) {
     free(run->debt_old);
     free(run->wall_before);
     free(run->v_before);
+    free(run->debt_before);
     free(run->map);
     free(run->out);
     free(run->worker);

@@ -81,7 +81,8 @@ struct silt_run {
     double *v_old, *debt_old; // owned, 2 and 1 per node, velocities and debts at the start of the step
     int *wall_before;  // owned, first wall of every node before contact
     double *v_before;  // owned, 2 per node
-    int wall_before_capacity, v_before_capacity;
+    double *debt_before; // owned, 1 per node
+    int wall_before_capacity, v_before_capacity, debt_before_capacity;
     int *map;        // owned, renumbering of the last rebuild
     int x_old_capacity, v_old_capacity, debt_old_capacity, map_capacity;
     double box_lo[3], box_hi[3]; // what lies outside has left
