@@ -41,67 +41,78 @@ static void book_join(book *b, int i, int k) {
 
 // ---- changed cells that share a facet
 
-typedef struct facet_record {
-    int key[3];
-    int cell[4]; // index + 1 of the changed cell: gone on the one side, on the other, come on the one, on the other
-} facet_record;
+// a facet of a changed cell, kept with the others that have the same lowest node
+typedef struct facet_item {
+    int other[2]; // its other nodes, rising
+    int cell;     // index of the changed cell
+    int side;     // 0 or 1: on which side of the facet the cell lies; 2 more when the cell is new
+} facet_item;
 
-// sorts a facet's nodes. @return 1 when that turns it round: the cell is on its other side
-static int facet_sort(int dim, int key[3]) {
-    int turned = 0;
-    for (int pass = 0; pass < 3; pass++) {
-        const int k = dim == 2 ? 0 : pass % 2, t = key[k];
-        if (key[k] > key[k + 1]) {
-            key[k] = key[k + 1];
-            key[k + 1] = t;
-            turned ^= 1;
-        }
-    }
-    return turned;
+// the changed cells of one facet: c[0] gone on its one side, c[1] on the other, c[2] come on the one, c[3] on the other; -1
+static void facet_join(book *b, const int c[4]) {
+    // the same side of a facet before and after
+    for (int side = 0; side < 2; side++)
+        if (c[side] >= 0 && c[2 + side] >= 0)
+            book_join(b, c[side], c[2 + side]);
+    // a facet inside the hollow, which is there only before or only after
+    for (int generation = 0; generation < 4; generation += 2)
+        if (c[generation] >= 0 && c[generation + 1] >= 0 && c[2 - generation] < 0 && c[3 - generation] < 0)
+            book_join(b, c[generation], c[generation + 1]);
+    // water on the one side before, on the other after
+    for (int side = 0; side < 2; side++)
+        if (c[side] >= 0 && c[3 - side] >= 0 && c[1 - side] < 0 && c[2 + side] < 0)
+            book_join(b, c[side], c[3 - side]);
 }
 
 static void book_facets(book *b) {
-    size_t size = 16;
-    while (size < 4 * (size_t)b->n_changed * (size_t)(b->dim + 1) / 3)
-        size *= 2;
-    facet_record *record = silt_alloc((size_t)b->n_changed * (size_t)(b->dim + 1) + 1, sizeof *record);
-    int *slot = silt_alloc(size, sizeof *slot), n_record = 0;
-    for (int k = 0; k < b->n_changed; k++) {
-        const int *cell = change_nodes(b, &b->item[k]);
-        for (int a = 0; a <= b->dim; a++) {
-            int key[3];
-            silt_cell_facet(b->dim, cell, a, key);
-            const int side = facet_sort(b->dim, key);
-            uint64_t z = (uint64_t)(uint32_t)key[0] * 0x9e3779b97f4a7c15u ^ (uint64_t)(uint32_t)key[1] * 0xbf58476d1ce4e5b9u ^
-                         (uint64_t)(uint32_t)key[2] * 0x94d049bb133111ebu;
-            z ^= z >> 29;
-            size_t at = (size_t)(z * 0x9e3779b97f4a7c15u >> 17) & (size - 1);
-            while (slot[at] && memcmp(record[slot[at] - 1].key, key, sizeof key) != 0)
-                at = (at + 1) & (size - 1);
-            if (!slot[at]) {
-                memcpy(record[n_record].key, key, sizeof key);
-                slot[at] = ++n_record;
+    const int n_node = b->nodes->count;
+    int *start = silt_alloc((size_t)n_node + 1, sizeof *start);
+    facet_item *item = silt_alloc((size_t)b->n_changed * (size_t)(b->dim + 1) + 1, sizeof *item);
+    for (int pass = 0; pass < 2; pass++) {
+        for (int k = 0; k < b->n_changed; k++) {
+            // without its first node the cell's rising nodes are a facet on one side, without its second on the other, ...
+            uint32_t node[4];
+            const int turned = silt_cell_sort(change_nodes(b, &b->item[k]), node), lowest = (int)(node[0] >> 2);
+            if (pass == 0) {
+                start[lowest] += b->dim;
+                start[node[1] >> 2]++;
+                continue;
             }
-            record[slot[at] - 1].cell[(b->item[k].generation ? 2 : 0) + side] = k + 1;
+            const int new = b->item[k].generation ? 2 : 0;
+            for (int a = 0; a <= b->dim; a++) {
+                const int second = (int)(node[a < 2 ? 2 : 1] >> 2), third = b->dim == 2 ? -1 : (int)(node[a < 3 ? 3 : 2] >> 2);
+                item[--start[a ? lowest : (int)(node[1] >> 2)]] =
+                    (facet_item){{second, third}, k, new + (turned ^ (a & 1))};
+            }
+        }
+        int sum = 0;
+        for (int i = 0; pass == 0 && i <= n_node; i++) {
+            sum += i < n_node ? start[i] : 0;
+            start[i] = sum;
         }
     }
-    for (int r = 0; r < n_record; r++) {
-        const int *c = record[r].cell;
-        // the same side of a facet before and after
-        for (int side = 0; side < 2; side++)
-            if (c[side] && c[2 + side])
-                book_join(b, c[side] - 1, c[2 + side] - 1);
-        // a facet inside the hollow, which is there only before or only after
-        for (int generation = 0; generation < 4; generation += 2)
-            if (c[generation] && c[generation + 1] && !c[2 - generation] && !c[3 - generation])
-                book_join(b, c[generation] - 1, c[generation + 1] - 1);
-        // water on the one side before, on the other after
-        for (int side = 0; side < 2; side++)
-            if (c[side] && c[3 - side] && !c[1 - side] && !c[2 + side])
-                book_join(b, c[side] - 1, c[3 - side] - 1);
-    }
-    free(record);
-    free(slot);
+    for (int i = 0; i < n_node; i++)
+        for (int end = start[i + 1], k = start[i]; k < end; k++) {
+            // takes all of this facet out of the bucket
+            int c[4] = {-1, -1, -1, -1}, n = 0;
+            const facet_item first = item[k];
+            for (int m = k; m < end;) {
+                if (item[m].other[0] != first.other[0] || item[m].other[1] != first.other[1]) {
+                    m++;
+                    continue;
+                }
+                c[item[m].side] = item[m].cell;
+                n++;
+                if (m == k)
+                    m++;
+                else
+                    item[m] = item[--end];
+            }
+            if (n > 1)
+                facet_join(b, c);
+        }
+    free(start);
+    free(item);
 }
 
 // ---- nodes that were moved since the memory was taken

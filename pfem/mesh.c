@@ -43,29 +43,19 @@ void silt_cells_across(int dim, int n_node, int n_cell, const int (*cell)[4], in
     int *item = silt_alloc((size_t)n_cell * (size_t)(dim + 1) + 1, sizeof *item);
     for (int pass = 0; pass < 2; pass++) {
         for (int e = 0; e < n_cell; e++) {
-            // the cell's lowest node is that of all facets but one
-            int lowest = 0, next = -1;
-            for (int a = 1; a <= dim; a++)
-                if (cell[e][a] < cell[e][lowest])
-                    lowest = a;
-            for (int a = 0; a <= dim; a++)
-                if (a != lowest && (next < 0 || cell[e][a] < cell[e][next]))
-                    next = a;
+            // the cell's lowest node is that of all facets but the one opposite it
+            uint32_t node[4];
+            silt_cell_sort(cell[e], node);
             if (pass == 0) {
-                start[cell[e][lowest]] += dim;
-                start[cell[e][next]]++;
+                start[node[0] >> 2] += dim;
+                start[node[1] >> 2]++;
                 continue;
             }
             for (int a = 0; a <= dim; a++) {
-                const int low = a == lowest ? next : lowest;
-                uint32_t other[2] = {UINT32_MAX, UINT32_MAX};
-                for (int b = 0, k = 0; b <= dim; b++)
-                    if (b != a && b != low)
-                        other[k++] = (uint32_t)cell[e][b];
-                const uint64_t lo = other[0] < other[1] ? other[0] : other[1], hi = other[0] < other[1] ? other[1] : other[0];
-                const int k = --start[cell[e][low]];
+                const uint64_t lo = node[a < 2 ? 2 : 1] >> 2, hi = dim == 2 ? 0 : node[a < 3 ? 3 : 2] >> 2;
+                const int k = --start[node[a ? 0 : 1] >> 2];
                 key[k] = lo << 32 | hi;
-                item[k] = 4 * e + a;
+                item[k] = 4 * e + (int)(node[a] & 3);
             }
         }
         int sum = 0;
@@ -219,8 +209,7 @@ void silt_mesh_connect_known(silt_mesh *mesh, const silt_nodes *nodes) {
         for (int a = 0; a < n_corner; a++)
             mesh->node_cell[--start[mesh->cell[e][a]]] = e;
 
-    // neighbours, the node itself included, rising; a facet that only one cell has is boundary
-    mesh->n_facet = 0;
+    // neighbours, the node itself included, rising
     int filled = 0;
     int *seen = silt_alloc((size_t)n + 1, sizeof *seen); // 1 + the last node that has it as neighbour
     for (int i = 0; i < n; i++) {
@@ -240,32 +229,44 @@ void silt_mesh_connect_known(silt_mesh *mesh, const silt_nodes *nodes) {
         list_sort(list, count);
         filled += count;
         mesh->wet[i] = start[i + 1] > start[i];
+    }
+    mesh->neighbour_start[n] = filled;
 
-        // facets are listed at their first node in 2-D, at their lowest in 3-D
-        for (int k = start[i]; k < start[i + 1]; k++)
+    // a facet that only one cell has is boundary; in the order of their first nodes, in 3-D the lowest, then of the cells
+    int *place = seen;
+    memset(place, 0, (size_t)(n + 1) * sizeof *place);
+    for (int pass = 0; pass < 2; pass++) {
+        for (int e = 0; e < mesh->n_cell; e++)
             for (int a = 0; a < n_corner; a++) {
-                const int e = mesh->node_cell[k];
-                int facet[3];
                 if (mesh->across[e][a] >= 0)
                     continue;
+                int facet[3];
                 silt_cell_facet(dim, mesh->cell[e], a, facet);
-                if (dim == 3 && facet[0] >= i)
-                    while (facet[1] < facet[0] || facet[2] < facet[0]) {
-                        const int t = facet[0];
-                        facet[0] = facet[1];
-                        facet[1] = facet[2];
-                        facet[2] = t;
-                    }
-                if (facet[0] != i)
-                    continue;
-                SILT_RESERVE(mesh->facet, mesh->facet_capacity, mesh->n_facet + 1);
-                SILT_RESERVE(mesh->facet_kind, mesh->facet_kind_capacity, mesh->n_facet + 1);
-                memcpy(mesh->facet[mesh->n_facet], facet, sizeof facet);
-                mesh->facet_kind[mesh->n_facet++] = (uint8_t)silt_facet_kind_of(mesh, nodes, facet);
+                while (dim == 3 && (facet[1] < facet[0] || facet[2] < facet[0])) {
+                    const int t = facet[0];
+                    facet[0] = facet[1];
+                    facet[1] = facet[2];
+                    facet[2] = t;
+                }
+                if (pass == 0)
+                    place[facet[0]]++;
+                else
+                    memcpy(mesh->facet[place[facet[0]]++], facet, sizeof facet);
             }
+        if (pass == 0) {
+            mesh->n_facet = 0;
+            for (int i = 0; i < n; i++) {
+                const int count = place[i];
+                place[i] = mesh->n_facet;
+                mesh->n_facet += count;
+            }
+            SILT_RESERVE(mesh->facet, mesh->facet_capacity, mesh->n_facet + 1);
+            SILT_RESERVE(mesh->facet_kind, mesh->facet_kind_capacity, mesh->n_facet + 1);
+        }
     }
     free(seen);
-    mesh->neighbour_start[n] = filled;
+    for (int k = 0; k < mesh->n_facet; k++)
+        mesh->facet_kind[k] = (uint8_t)silt_facet_kind_of(mesh, nodes, mesh->facet[k]);
     for (int k = 0; k < mesh->n_facet; k++)
         for (int a = 0; a < dim; a++)
             if (mesh->facet_kind[k] == FACET_FREE)

@@ -28,54 +28,57 @@ bool silt_barrier_contains(const silt_barrier *barrier, const double point[2]) {
     return false;
 }
 
-// ---- a set of cells by their nodes
+// ---- a set of cells by their nodes: sorted by the highest one, which keeps neighbours together in memory
 
+// nodes from the highest to the lowest
 static void cell_key(const int cell[4], int key[4]) {
-    memcpy(key, cell, 4 * sizeof *key);
-    for (int pair = 0; pair < 5; pair++) {
-        static const int network[5][2] = {{0, 1}, {2, 3}, {0, 2}, {1, 3}, {1, 2}};
-        const int p = network[pair][0], q = network[pair][1];
-        if (key[p] > key[q]) {
-            const int t = key[p];
-            key[p] = key[q];
-            key[q] = t;
+    uint32_t node[4];
+    silt_cell_sort(cell, node);
+    const bool solid = cell[3] >= 0;
+    key[0] = (int)(node[solid ? 3 : 2] >> 2);
+    key[1] = (int)(node[solid ? 2 : 1] >> 2);
+    key[2] = (int)(node[solid ? 1 : 0] >> 2);
+    key[3] = solid ? (int)(node[0] >> 2) : -1;
+}
+
+void silt_cell_set_create(silt_cell_set *set, int n_node, int n, const int (*cell)[4]) {
+    set->n_node = n_node;
+    set->start = silt_alloc((size_t)n_node + 1, sizeof *set->start);
+    set->item = silt_alloc((size_t)n + 1, sizeof *set->item);
+    for (int pass = 0; pass < 2; pass++) {
+        for (int e = n - 1; e >= 0; e--) {
+            int key[4];
+            cell_key(cell[e], key);
+            if (pass == 0)
+                set->start[key[0]]++;
+            else
+                set->item[--set->start[key[0]]] = (struct silt_cell_item){{key[1], key[2], key[3]}, e};
+        }
+        int sum = 0;
+        for (int i = 0; pass == 0 && i <= n_node; i++) {
+            sum += i < n_node ? set->start[i] : 0;
+            set->start[i] = sum;
         }
     }
 }
 
-static size_t cell_hash(const int key[4]) {
-    uint64_t z = (uint64_t)(uint32_t)key[0] * 0x9e3779b97f4a7c15u ^ (uint64_t)(uint32_t)key[1] * 0xbf58476d1ce4e5b9u ^
-                 (uint64_t)(uint32_t)key[2] * 0x94d049bb133111ebu ^ (uint64_t)(uint32_t)key[3] * 0xd6e8feb86659fd93u;
-    z ^= z >> 29;
-    return (size_t)(z * 0x9e3779b97f4a7c15u >> 17);
-}
-
-void silt_cell_set_create(silt_cell_set *set, int n, const int (*cell)[4]) {
-    size_t size = 16;
-    while (size < 2 * (size_t)n + 2)
-        size *= 2;
-    set->slot = silt_alloc(size, sizeof *set->slot);
-    set->mask = size - 1;
-    set->cell = cell;
-    for (int e = 0; e < n; e++) {
-        int key[4];
-        cell_key(cell[e], key);
-        size_t k = cell_hash(key) & set->mask;
-        while (set->slot[k])
-            k = (k + 1) & set->mask;
-        set->slot[k] = e + 1;
-    }
-}
-
 int silt_cell_set_find(const silt_cell_set *set, const int cell[4]) {
-    int key[4], other[4];
+    int key[4];
     cell_key(cell, key);
-    for (size_t k = cell_hash(key) & set->mask; set->slot[k]; k = (k + 1) & set->mask) {
-        cell_key(set->cell[set->slot[k] - 1], other);
-        if (memcmp(other, key, sizeof key) == 0)
-            return set->slot[k] - 1;
+    if (key[0] >= set->n_node)
+        return -1;
+    for (int k = set->start[key[0]]; k < set->start[key[0] + 1]; k++) {
+        const int *other = set->item[k].node;
+        if (other[0] == key[1] && other[1] == key[2] && other[2] == key[3])
+            return set->item[k].cell;
     }
     return -1;
+}
+
+void silt_cell_set_clear(silt_cell_set *set) {
+    free(set->start);
+    free(set->item);
+    *set = (silt_cell_set){0};
 }
 
 // ---- what a cell of the cloud is
@@ -477,7 +480,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
         facet[k][3] = -1;
     }
     silt_cell_set rim;
-    silt_cell_set_create(&rim, dim == 3 ? mesh->n_facet : 0, (const int(*)[4])facet);
+    silt_cell_set_create(&rim, mesh->n_node, dim == 3 ? mesh->n_facet : 0, (const int(*)[4])facet);
 
     mesh->n_cell = 0;
     for (int e = 0; e < n_cells; e++) {
@@ -519,7 +522,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
     }
     silt_mesh_clear(&gone);
     silt_locator_clear(&locator);
-    free(rim.slot);
+    silt_cell_set_clear(&rim);
     free(facet);
     free(stays);
     free(before);
@@ -543,7 +546,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
             x[0] = scene->period[0];
     }
     silt_cell_set old;
-    silt_cell_set_create(&old, memory->n_cell, (const int(*)[4])memory->cell);
+    silt_cell_set_create(&old, memory->n_node, memory->n_cell, (const int(*)[4])memory->cell);
     silt_draft draft = {.mesh = mesh};
     uint8_t *sliver = NULL;
     // copies beyond a periodic border must reach as far as the largest empty sphere of the water
@@ -551,7 +554,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
         int (*cells)[4] = NULL, n_cells = 0;
         const silt_status status = cloud_cells(mesh, nodes, scene, memory->dead, margin, &cells, &n_cells, err);
         if (status != SILT_OK) {
-            free(old.slot);
+            silt_cell_set_clear(&old);
             free(sliver);
             draft_clear(&draft);
             return status;
@@ -571,7 +574,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
             was_wet[memory->cell[e][a]] = 1;
     silt_book_volume(&draft, nodes, memory, &old, was_wet, scene->fluid.size);
     free(was_wet);
-    free(old.slot);
+    silt_cell_set_clear(&old);
     free(sliver);
     draft_clear(&draft);
 

@@ -8,14 +8,35 @@
 
 #define CELL_FLAT 0.02 // cells of less height than this times h are slivers: none is left at the surface, few inside
 
-/** a set of cells by their nodes, in whatever order these are */
+/** A cell's nodes rising, each times four plus its place in the cell; a triangle's fourth is the largest number.
+ * @return 1 when that turns the cell inside out */
+static inline int silt_cell_sort(const int *cell, uint32_t rising[4]) {
+    uint32_t a = 4 * (uint32_t)cell[0], b = 4 * (uint32_t)cell[1] + 1, c = 4 * (uint32_t)cell[2] + 2;
+    uint32_t d = cell[3] < 0 ? UINT32_MAX : 4 * (uint32_t)cell[3] + 3, low;
+    const int turned = (a > b) ^ (c > d);
+    low = a < b ? a : b, b = a < b ? b : a, a = low;
+    low = c < d ? c : d, d = c < d ? d : c, c = low;
+    const int again = (a > c) ^ (b > d);
+    low = a < c ? a : c, c = a < c ? c : a, a = low;
+    low = b < d ? b : d, d = b < d ? d : b, b = low;
+    const int last = b > c;
+    low = b < c ? b : c, c = b < c ? c : b, b = low;
+    rising[0] = a, rising[1] = b, rising[2] = c, rising[3] = d;
+    return turned ^ again ^ last;
+}
+
+/** a set of cells (or of facets, which have no fourth node) by their nodes, in whatever order these are */
 typedef struct silt_cell_set {
-    int *slot; // owned, index + 1 of the cell, 0 empty
-    size_t mask;
-    const int (*cell)[4]; // borrowed
+    int n_node;
+    int *start; // owned, n_node + 1: the items whose highest node it is
+    struct silt_cell_item {
+        int node[3]; // the others, falling
+        int cell;    // index
+    } *item;         // owned
 } silt_cell_set;
-void silt_cell_set_create(silt_cell_set *set, int n, const int (*cell)[4]);
+void silt_cell_set_create(silt_cell_set *set, int n_node, int n, const int (*cell)[4]);
 int silt_cell_set_find(const silt_cell_set *set, const int cell[4]); /**< index of the cell, or -1 */
+void silt_cell_set_clear(silt_cell_set *set);
 
 /** a cell's measures */
 typedef struct silt_cell_shape {

@@ -360,7 +360,7 @@ static void check_same(const bench *a, const bench *b, const char *what, int ste
     for (int i = 0; i < n; i++)
         other[b->nodes.id[i]] = i;
     silt_cell_set set;
-    silt_cell_set_create(&set, b->mesh.n_cell, (const int(*)[4])b->mesh.cell);
+    silt_cell_set_create(&set, n, b->mesh.n_cell, (const int(*)[4])b->mesh.cell);
     int apart = 0;
     for (int e = 0; e < a->mesh.n_cell; e++) {
         int cell[4] = {-1, -1, -1, -1};
@@ -373,7 +373,7 @@ static void check_same(const bench *a, const bench *b, const char *what, int ste
     for (int i = 0; i < n; i++)
         if (fabs(a->nodes.debt[i] - b->nodes.debt[other[a->nodes.id[i]]]) > 1e-14)
             fail_msg("%s, %d-D, step %d: debts differ by %.3g", what, dim, step, a->nodes.debt[i] - b->nodes.debt[other[a->nodes.id[i]]]);
-    free(set.slot);
+    silt_cell_set_clear(&set);
     free(other);
 }
 
