@@ -10,7 +10,7 @@
 #define FILL_SPIRAL 40
 #define FILL_ROUNDS 4
 static const double fill_gap[FILL_ROUNDS] = {0.85, 0.75, 0.75, 0.75}; // times h: room for a node in each round of growing
-static const int fill_sweeps[FILL_ROUNDS] = {30, 30, 30, 10};         // after it
+static const int fill_sweeps[FILL_ROUNDS] = {20, 12, 12, 8};          // after it
 
 // ---- edges
 
