@@ -253,9 +253,10 @@ KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const doubl
     }
 }
 
-void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_drag *drag, const double *v, const double *p) {
+void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
+                              const double *p) {
     for (int j = 0; j < f->n_node; j++) {
-        const double asked = -f->rate[j] - (drag ? drag->source[j] : 0);
+        const double asked = -(rate ? rate[j] : 0) - (drag ? drag->source[j] : 0);
         f->residual[j] = f->mobile[j] == 1 ? asked : 0;
         f->withheld[j] = f->mobile[j] == 1 ? 0 : asked;
     }

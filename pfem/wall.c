@@ -497,7 +497,10 @@ void wall_sliding(const silt_walls *walls, int e, double v[3]) {
 }
 
 void silt_walls_velocity(const silt_walls *walls, const silt_scene *scene, int element, const double *x, double v[3]) {
-    (void)scene;
+    if (!walls->index) { // elements made by hand stand still
+        memcpy(v, scene->wall[walls->wall[element]].velocity, 3 * sizeof *v);
+        return;
+    }
     const int w = walls->wall[element], dim = wall_dim(walls);
     const wall_step *step = &walls->index->step[w];
     const silt_wall_motion *motion = &walls->motion[w];
