@@ -348,9 +348,6 @@ static void space_frame(space *s) {
 }
 
 void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, int n_frame) {
-    silt_walls walls = {0};
-    if (silt_walls_create(&walls, c->scene, NULL) != SILT_OK) // a file that is gone since the run is no reason not to draw
-        silt_walls_clear(&walls);
     double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
     c->low = HUGE_VAL, c->high = -HUGE_VAL;
     int samples = n_frame < DRAW_SAMPLES ? n_frame : DRAW_SAMPLES;
@@ -373,13 +370,12 @@ void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, 
     }
     // walls bound the room; upwards the water does, high empty tanks are cut
     const double room = lo[2] <= hi[2] ? hi[2] + 0.15 * (hi[2] - lo[2]) : HUGE_VAL;
-    for (int i = 0; i < walls.count && walls.corner; i++)
+    for (int i = 0; c->walls && c->walls->corner && i < c->walls->count; i++)
         for (int k = 0; k < 9; k++) {
-            lo[k % 3] = silt_min(lo[k % 3], walls.corner[i][k / 3][k % 3]);
-            hi[k % 3] = silt_max(hi[k % 3], walls.corner[i][k / 3][k % 3]);
+            lo[k % 3] = silt_min(lo[k % 3], c->walls->corner[i][k / 3][k % 3]);
+            hi[k % 3] = silt_max(hi[k % 3], c->walls->corner[i][k / 3][k % 3]);
         }
     hi[2] = silt_min(hi[2], room);
-    silt_walls_clear(&walls);
     for (int d = 0; d < 3; d++) {
         c->lo[d] = lo[d] <= hi[d] ? lo[d] : 0;
         c->hi[d] = hi[d] > c->lo[d] ? hi[d] : c->lo[d] + 1;
@@ -421,7 +417,6 @@ void silt_draw_space(silt_draw_canvas *c, const silt_frame_entry *entry) {
     space s = {
         .c = c, .width = SPACE_FINE * c->width, .height = SPACE_FINE * c->height, .scale = SPACE_FINE * c->scale};
     const size_t n = (size_t)s.width * (size_t)s.height;
-    silt_walls walls = {0};
     space_frame(&s);
     s.depth = silt_alloc(n, sizeof *s.depth);
     s.ink = silt_alloc(n, sizeof *s.ink);
@@ -429,15 +424,11 @@ void silt_draw_space(silt_draw_canvas *c, const silt_frame_entry *entry) {
         s.depth[k] = -HUGE_VALF;
         s.ink[k][0] = s.ink[k][1] = s.ink[k][2] = 1;
     }
-    if (silt_walls_create(&walls, c->scene, NULL) != SILT_OK) // a file that is gone since the run is no reason not to draw
-        silt_walls_clear(&walls);
-    silt_walls_move(&walls, c->scene, entry->time, 0);
-    if (walls.corner)
-        space_walls(&s, &walls);
+    if (c->walls && c->walls->corner)
+        space_walls(&s, c->walls);
     space_water(&s, entry->number);
     space_show(&s);
     space_scales(&s);
-    silt_walls_clear(&walls);
     free(s.depth);
     free(s.ink);
 }

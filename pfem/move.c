@@ -306,14 +306,12 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     hand_on_landing(run, run->wall_before, run->v_before);
     let_out(run);
     expel(run);
-    mesh->walls = &run->walls;
     silt_mesh_refine(mesh, nodes, &run->memory, h);
 
     const double middle = silt_seconds();
     run->phase[PHASE_move] += middle - since;
     SILT_RESERVE(run->map, run->map_capacity, nodes->count + 1);
     SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
-    silt_nodes_hand_on(nodes, mesh, &run->memory, run->map);
     run->ledger.volume_reconnected += run->memory.reconnected;
     // without an outlet nothing may leave: what does anyway shows as a volume error
     if (scene->fluid.n_outlet)

@@ -160,7 +160,6 @@ double silt_size_at(const silt_size *size, const silt_scene *scene, const double
 void silt_size_free(silt_size **size);
 /** signed distance from a region, m, negative inside; dim 3: polygons are upright prisms in x-z, circles are spheres */
 double silt_region_distance(const silt_region *region, int dim, const double *x);
-void silt_region_span(const silt_region *region, int dim, double lo[3], double hi[3]); /**< its bounds, m */
 
 // ---------------------------------------------------------------- mesh (mesh.c)
 
@@ -229,8 +228,6 @@ typedef struct silt_memory {
     int n_node, flag_capacity, dead_capacity;
     uint8_t *interior; // owned, one per node: had cells and no free facet
     uint8_t *dead;     // owned, one per node: leaves the cloud at the rebuild; NODE_LEFT: takes its water out of the domain
-    int momentum_capacity;
-    double *momentum;  // owned, dim + 1 per cell: its volume times mean velocity, m4/s, and volume, m3, when the cloud was edited
     double reconnected;     // m3, volume that the rebuild itself made (positive) or lost
     double left;            // m3, volume that went with the nodes that left
     int flat;               // 3-D: cells flatter than a fiftieth of h that could not be mended
@@ -249,12 +246,10 @@ void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nod
 /** Makes the memory's flags as long as the cloud is now. */
 void silt_memory_extend(silt_memory *memory, int n_node);
 /** Marks crowded nodes dead and adds nodes where the mesh is stretched, against the local size (refine.c). Nodes added on
- * curved walls are put onto them (mesh->walls).
+ * curved walls are put onto them (mesh->walls); velocity and pressure are those of the edge they split. The momentum that this
+ * moves is silt_momentum_hand_on's business.
  * @param h  fluid.size */
 void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h);
-/** After the rebuild: what cells that came and went together held as momentum, their nodes have again (refine.c).
- * @param map  of the rebuild */
-void silt_nodes_hand_on(silt_nodes *nodes, const silt_mesh *mesh, const silt_memory *memory, const int *map);
 /** Shifts inner nodes by up to fluid.shuffle * h in each direction, their pressure and velocity with them along the mesh's
  * gradients. The random numbers hang on fluid.seed, the step and the node's id. Before silt_memory_take. */
 void silt_nodes_shuffle(silt_nodes *nodes, const silt_mesh *mesh, const silt_scene *scene, int64_t step);

@@ -102,6 +102,7 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
         return SILT_OK;
 
     // bodies and bed first: the water keeps its distance
+    run->nodes.dim = scene->dimension;
     for (int b = 0; run->barrier.bodies && b < run->barrier.bodies->count; b++) {
         const struct silt_body *body = &run->barrier.bodies->body[b];
         const double c = 1 - 2 * silt_square(body->q[3]), s = 2 * body->q[0] * body->q[3];
@@ -119,7 +120,10 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
         if (run->bed.exposed[k])
             run->bed.fluid_node[k] = silt_nodes_add(&run->nodes, NODE_BED, k, run->bed.x[k]);
     silt_size_create(&run->size, scene, &run->walls);
-    silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
+    if (scene->fluid.cloud)
+        SILT_TRY(silt_nodes_read(&run->nodes, scene, &run->walls, run_solid, &run->barrier, err));
+    else
+        silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
     SILT_TRY(silt_mesh_first(&run->mesh, &run->nodes, scene, &run->barrier, err));
     silt_size_update(run->size, &run->nodes, &run->mesh);
     SILT_TRY(silt_run_pockets(run, err));
