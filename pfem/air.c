@@ -317,20 +317,23 @@ void silt_air_cells(silt_air *air, const silt_scene *scene, const silt_mesh *mes
 
 silt_status silt_air_find(silt_air *air, const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh,
                           const silt_barrier *barrier, silt_error *err) {
+    const int dim = silt_nodes_dim(nodes);
+    if (dim != 2)
+        return silt_fail(err, SILT_FAILED, "closed air pockets are found in two dimensions only");
     silt_air_points(air, scene, nodes, mesh, barrier->walls);
-    int *live = silt_alloc((size_t)air->n_point + 1, sizeof *live), m = 0, *triangle = NULL, n_triangle = 0;
-    double *x = silt_alloc(2 * (size_t)air->n_point + 2, sizeof *x);
+    int *live = silt_alloc((size_t)air->n_point + 1, sizeof *live), m = 0, *cell = NULL, n_cell = 0;
+    double *x = silt_alloc((size_t)(dim * air->n_point) + 1, sizeof *x);
     for (int i = 0; i < air->n_point; i++)
         if (!silt_air_skips(nodes, mesh, i)) {
-            memcpy(x + 2 * m, air->x + 2 * i, 2 * sizeof *x);
+            memcpy(x + dim * m, air->x + dim * i, (size_t)dim * sizeof *x);
             live[m++] = i;
         }
-    const int failed = silt_delaunay_2d(m, x, &triangle, &n_triangle);
-    for (int k = 0; !failed && k < 3 * n_triangle; k++)
-        triangle[k] = live[triangle[k]];
+    const int failed = silt_delaunay_2d(m, x, &cell, &n_cell);
+    for (int k = 0; !failed && k < (dim + 1) * n_cell; k++)
+        cell[k] = live[cell[k]];
     if (!failed)
-        silt_air_cells(air, scene, mesh, barrier, n_triangle, triangle);
-    free(triangle);
+        silt_air_cells(air, scene, mesh, barrier, n_cell, cell);
+    free(cell);
     free(live);
     free(x);
     return failed ? silt_fail(err, SILT_FAILED, "no memory for the triangulation of the air around %d nodes", m) : SILT_OK;

@@ -36,6 +36,8 @@ static silt_status draw_picture(silt_draw_canvas *c, const silt_frame_entry *ent
     cairo_set_source_rgb(c->cr, 1, 1, 1);
     cairo_paint(c->cr);
 
+    if (c->walls)
+        silt_walls_move(c->walls, c->scene, entry->time, 0);
     if (c->scene->dimension == 3 && !c->slice)
         silt_draw_space(c, entry);
     else
@@ -80,6 +82,7 @@ silt_status silt_draw(const char *out, int frame, const char *field, const char 
     silt_draw_canvas canvas = {.out = out};
     silt_frame_entry *entry = NULL;
     silt_scene *scene = NULL;
+    silt_walls walls = {0};
     silt_status status = SILT_OK;
     int n, drawn = 0;
     for (int i = 0; i < N_FIELD; i++)
@@ -108,6 +111,9 @@ silt_status silt_draw(const char *out, int frame, const char *field, const char 
                            canvas.slice ? "a slice is for three dimensions" : "vorticity is drawn in two dimensions");
         goto done;
     }
+    // the run had them: a surface file that is gone since is no reason not to draw
+    if (silt_walls_create(&walls, scene, NULL) == SILT_OK)
+        canvas.walls = &walls;
     if (scene->dimension == 3 && !canvas.slice)
         silt_draw_space_survey(&canvas, entry, n);
     else
@@ -122,6 +128,7 @@ silt_status silt_draw(const char *out, int frame, const char *field, const char 
         status = silt_fail(err, SILT_INPUT, "%s: has no frame %d; its frames are %d to %d", out, frame, entry[0].number,
                            entry[n - 1].number);
 done:
+    silt_walls_clear(&walls);
     silt_scene_free(&scene);
     free(entry);
     free(path);

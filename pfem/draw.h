@@ -38,6 +38,7 @@ typedef struct silt_draw_field {
 typedef struct silt_draw_canvas {
     const char *out;
     const silt_scene *scene;
+    silt_walls *walls; // of the scene, moved to the time of the picture; NULL: none
     const silt_draw_field *field;
     double lo[3], hi[3]; // m, the plot's extent; in 3-D the box that is shown
     int slice;           // 3-D: 1 to 3: a cut across x, y or z, drawn in the plane; 0: none
@@ -82,7 +83,7 @@ void silt_draw_flat(silt_draw_canvas *c, const silt_frame_entry *entry);
 void silt_draw_slice(const silt_draw_canvas *c, silt_grid *grid);
 /** Walls as lines in the picture's plane, m: those that move (2-D), or the cut ones. @return how many; owned by the
  * caller */
-int silt_draw_lines(const silt_draw_canvas *c, double time, double (**line)[4]);
+int silt_draw_lines(const silt_draw_canvas *c, double (**line)[4]);
 void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, int n_frame);
 void silt_draw_space(silt_draw_canvas *c, const silt_frame_entry *entry);
 

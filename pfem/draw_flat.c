@@ -40,7 +40,7 @@ void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, i
         for (int k = 0; k < c->scene->wall[i].n_point; k++)
             draw_extend(wall_lo, wall_hi, c->scene->wall[i].point[3 * k], c->scene->wall[i].point[3 * k + 1]);
     double(*line)[4];
-    const int n_line = c->slice ? silt_draw_lines(c, entry[0].time, &line) : 0;
+    const int n_line = c->slice ? silt_draw_lines(c, &line) : 0;
     for (int i = 0; i < n_line; i++)
         for (int k = 0; k < 4; k += 2)
             draw_extend(wall_lo, wall_hi, line[i][k], line[i][k + 1]);
@@ -248,7 +248,7 @@ static void draw_bodies(silt_draw_canvas *c, int number) {
     silt_grid_clear(&grid);
 }
 
-static void draw_walls(silt_draw_canvas *c, double time) {
+static void draw_walls(silt_draw_canvas *c) {
     silt_draw_ink(c->cr, 0x2b2b2b);
     cairo_set_line_width(c->cr, 3);
     cairo_set_line_join(c->cr, CAIRO_LINE_JOIN_MITER);
@@ -262,7 +262,7 @@ static void draw_walls(silt_draw_canvas *c, double time) {
     }
     // those that move, or the cut ones
     double(*line)[4];
-    const int n = silt_draw_lines(c, time, &line);
+    const int n = silt_draw_lines(c, &line);
     cairo_set_line_cap(c->cr, CAIRO_LINE_CAP_ROUND);
     for (int i = 0; i < n; i++) {
         cairo_move_to(c->cr, draw_x(c, line[i][0]), draw_y(c, line[i][1]));
@@ -318,7 +318,7 @@ void silt_draw_flat(silt_draw_canvas *c, const silt_frame_entry *entry) {
         draw_grains(c, entry->number);
         draw_bodies(c, entry->number);
     }
-    draw_walls(c, entry->time);
+    draw_walls(c);
     cairo_restore(c->cr);
     draw_axes(c);
 }

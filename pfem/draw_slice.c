@@ -103,29 +103,26 @@ void silt_draw_slice(const silt_draw_canvas *c, silt_grid *grid) {
     *grid = cut;
 }
 
-int silt_draw_lines(const silt_draw_canvas *c, double time, double (**line)[4]) {
-    silt_walls walls = {0};
+int silt_draw_lines(const silt_draw_canvas *c, double (**line)[4]) {
+    const silt_walls *walls = c->walls;
     int n = 0, right = 0, up = 1;
-    if (silt_walls_create(&walls, c->scene, NULL) != SILT_OK) // the run had them: a file that is gone since is no reason not to draw
-        silt_walls_clear(&walls);
-    silt_walls_move(&walls, c->scene, time, 0);
-    *line = silt_alloc((size_t)walls.count + 1, sizeof **line);
+    *line = silt_alloc((size_t)(walls ? walls->count : 0) + 1, sizeof **line);
     if (c->slice)
         slice_axes(c->slice - 1, &right, &up);
-    for (int i = 0; i < walls.count; i++) {
+    for (int i = 0; walls && i < walls->count; i++) {
         double *at = (*line)[n];
         if (!c->slice) {
             // walls that stand are drawn whole, with their corners
-            if (c->scene->wall[walls.wall[i]].motion.n_row == 0)
+            if (c->scene->wall[walls->wall[i]].motion.n_row == 0)
                 continue;
-            memcpy(at, walls.from[i], 2 * sizeof *at);
-            memcpy(at + 2, walls.to[i], 2 * sizeof *at);
+            memcpy(at, walls->from[i], 2 * sizeof *at);
+            memcpy(at + 2, walls->to[i], 2 * sizeof *at);
             n++;
             continue;
         }
         int ends = 0;
-        for (int k = 0; k < 3 && walls.corner; k++) {
-            const double *a = walls.corner[i][k], *b = walls.corner[i][(k + 1) % 3];
+        for (int k = 0; k < 3 && walls->corner; k++) {
+            const double *a = walls->corner[i][k], *b = walls->corner[i][(k + 1) % 3];
             const double p = a[c->slice - 1] - c->slice_at, q = b[c->slice - 1] - c->slice_at;
             if ((p < 0) == (q < 0) || ends == 2)
                 continue;
@@ -135,6 +132,5 @@ int silt_draw_lines(const silt_draw_canvas *c, double time, double (**line)[4]) 
         }
         n += ends == 2;
     }
-    silt_walls_clear(&walls);
     return n;
 }

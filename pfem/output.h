@@ -119,7 +119,7 @@ typedef struct silt_check_result {
 /** Holds OUT/history.csv against the scene's checks; result has scene->n_check items. References are looked for in OUT
  * first, then beside the scene. A check that cannot be measured fails with a note; only an unreadable history is an error. */
 silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_check_result *result, silt_error *err);
-/** Copies the files that the scene reads (references, series) into OUT and writes OUT/scene.yaml: the resolved scene,
+/** Copies the files that the scene reads (references, series, surfaces, outlines, clouds) into OUT and writes OUT/scene.yaml: the resolved scene,
  * which names the copies, so that OUT can be verified, resumed and run again anywhere. */
 silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err);
 /** Holds OUT against the checks of OUT/scene.yaml; prints a line a check to `to`. SILT_FAILED when one fails. */

@@ -35,7 +35,8 @@ bool silt_air_skips(const silt_nodes *nodes, const silt_mesh *mesh, int point);
 /** Takes the cells of a triangulation of those points (dim + 1 points each) that are air, and marks what has open air beyond. */
 void silt_air_cells(silt_air *air, const silt_scene *scene, const silt_mesh *mesh, const silt_barrier *barrier, int n,
                     const int *cell);
-/** All of it in 2-D: points, Delaunay, cells. Errors: SILT_FAILED, no memory for the triangulation. */
+/** All of it in 2-D: points, Delaunay, cells. Errors: SILT_FAILED, no memory for the triangulation, or 3-D (where the caller
+ * triangulates the points between silt_air_points and silt_air_cells). */
 silt_status silt_air_find(silt_air *air, const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh,
                           const silt_barrier *barrier, silt_error *err);
 void silt_air_clear(silt_air *air);
@@ -89,9 +90,10 @@ void silt_pockets_advance(silt_pockets *pockets, const silt_scene *scene, const 
 /** Surface vectors of the nodes at positions x, and the pressure that belongs to the volume at the step's start. */
 void silt_pockets_load(silt_pockets *pockets, const silt_mesh *mesh, const double *x);
 /** out += force of the air on the water, N: -(pressure + stiffness dt sum B.w) B with B the vectors; dt: the length of time that w
- * compresses the air for (0: the pressure as it is). The part with w is the symmetric operator stiffness dt B B^T. */
+ * compresses the air for, theta times the step (0: the pressure as it is). The part with w is the symmetric operator
+ * stiffness dt B B^T; taken with the last iterate's w it converges where silt_pockets_stiff is well below one. */
 void silt_pockets_force(const silt_pockets *pockets, int dim, double dt, const double *w, double *out);
-/** dt stiffness |B|^2 dt/mass at most over pockets: above one the part with w must be solved for, not lagged. mass: kg per node */
+/** Largest dt^2 stiffness sum |B|^2/mass of a pocket: above one the part with w must be solved for. mass: kg per node */
 double silt_pockets_stiff(const silt_pockets *pockets, int dim, double dt, const double *mass);
 /** checkpoint: "pockets/..." */
 silt_status silt_pockets_save(const silt_pockets *pockets, silt_store *store, silt_error *err);

@@ -391,6 +391,10 @@ char *silt_scene_text_named(const silt_scene *scene, const char *const *name);
 /** Prints what the table of keys says: one line per key when key is NULL, a block's keys, or all about one key
  * ("fluid.size", "bodies.density"; a last part alone will do). Errors: SILT_INPUT, no such key, with the nearest. */
 silt_status silt_scene_help(const char *key, FILE *to, silt_error *err);
+/** The resolved scene with other names for the files that it reads; owned by the caller.
+ * @param name  called with every file in the order of the text: what is written in its place, valid until the next call */
+typedef const char *silt_file_name(void *self, const char *path);
+char *silt_scene_named(const silt_scene *scene, silt_file_name *name, void *self);
 /** Prints docs/scene.md: every key of the table in markdown. */
 void silt_scene_document(FILE *to);
 

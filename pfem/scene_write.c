@@ -264,3 +264,15 @@ char *silt_scene_text_named(const silt_scene *scene, const char *const *name) {
     free(state.file);
     return text;
 }
+
+char *silt_scene_named(const silt_scene *scene, silt_file_name *name, void *self) {
+    const char **file = NULL;
+    const int n = silt_scene_files(scene, &file);
+    const char **named = silt_alloc((size_t)n + 1, sizeof *named);
+    for (int k = 0; k < n; k++)
+        named[k] = name(self, file[k]);
+    char *text = silt_scene_text_named(scene, named);
+    free(named);
+    free(file);
+    return text;
+}

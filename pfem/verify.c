@@ -92,30 +92,41 @@ static const char *plain_name(const char *path) {
     return strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
 }
 
-// the copy of the k-th file in OUT: its plain name, or one with a number when that name is taken by another file
-static char *verify_copy_name(const char *const *file, int k) {
-    const char *name = plain_name(file[k]);
-    int first = 0; // where this file comes first
-    while (strcmp(file[first], file[k]) != 0)
-        first++;
-    for (int i = 0; i < first; i++)
-        if (strcmp(name, plain_name(file[i])) == 0)
-            return silt_text("%d_%s", first, name);
-    return silt_text("%s", name);
+// ---------------------------------------------------------------- copies of the scene's files
+
+/** the files that a scene reads, and the names of their copies in OUT */
+typedef struct verify_files {
+    int n, path_capacity, name_capacity;
+    char **path, **name; // owned, texts too
+} verify_files;
+
+// the plain name, or one with a number where that is taken, by another file or by what a run writes
+static const char *verify_name(void *self, const char *path) {
+    static const char *const own[] = {"history.csv", "scene.yaml", "summary.json", "run.log", "dem.log", "run.h5"};
+    verify_files *files = self;
+    const char *plain = plain_name(path);
+    bool taken = false;
+    for (int i = 0; i < files->n; i++) {
+        if (strcmp(files->path[i], path) == 0)
+            return files->name[i];
+        taken |= strcmp(files->name[i], plain) == 0;
+    }
+    for (size_t i = 0; i < sizeof own / sizeof *own; i++)
+        taken |= strcmp(plain, own[i]) == 0;
+    SILT_RESERVE(files->path, files->path_capacity, files->n + 1);
+    SILT_RESERVE(files->name, files->name_capacity, files->n + 1);
+    files->path[files->n] = silt_text("%s", path);
+    files->name[files->n] = taken ? silt_text("%d_%s", files->n, plain) : silt_text("%s", plain);
+    return files->name[files->n++];
 }
 
-// where in OUT the copy of a check's reference is
-static char *verify_copy_path(const silt_scene *scene, const char *out, const char *path) {
-    const char **file = NULL;
-    char *full = NULL;
-    for (int k = 0, n = silt_scene_files(scene, &file); k < n && !full; k++)
-        if (strcmp(file[k], path) == 0) {
-            char *name = verify_copy_name(file, k);
-            full = silt_text("%s/%s", out, name);
-            free(name);
-        }
-    free(file);
-    return full ? full : silt_text("%s/%s", out, plain_name(path));
+static void verify_files_clear(verify_files *files) {
+    for (int i = 0; i < files->n; i++) {
+        free(files->path[i]);
+        free(files->name[i]);
+    }
+    free(files->path);
+    free(files->name);
 }
 
 static void verify_note(silt_check_result *result, const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -127,14 +138,14 @@ static void verify_note(silt_check_result *result, const char *format, ...) {
 }
 
 // the reference's rows that `where` picks
-static bool verify_read(const silt_scene *scene, const char *out, int check, silt_curve *curve,
+static bool verify_read(const silt_scene *scene, const char *out, verify_files *files, int check, silt_curve *curve,
                         silt_check_result *result) {
     const silt_check_def *def = &scene->check[check];
     const char *wanted[3] = {def->x, def->y, def->where_column};
     int column[3] = {-1, -1, -1};
     silt_series series = {0};
     silt_error err = {0};
-    char *copy = verify_copy_path(scene, out, def->reference);
+    char *copy = silt_text("%s/%s", out, verify_name(files, def->reference));
     bool here = access(copy, R_OK) == 0;
     silt_status status = silt_series_read(here ? NULL : scene->folder, here ? copy : def->reference, &series, &err);
     free(copy);
@@ -159,11 +170,11 @@ static bool verify_read(const silt_scene *scene, const char *out, int check, sil
 }
 
 // difference of the history, or of the profile, from the reference at the reference's abscissas
-static void verify_curve_check(const silt_scene *scene, const char *out, int check, silt_curve *history,
-                               silt_check_result *result) {
+static void verify_curve_check(const silt_scene *scene, const char *out, verify_files *files, int check,
+                               silt_curve *history, silt_check_result *result) {
     const silt_check_def *def = &scene->check[check];
     silt_curve reference = {0};
-    if (!verify_read(scene, out, check, &reference, result))
+    if (!verify_read(scene, out, files, check, &reference, result))
         goto done;
     if (def->kind == CHECK_PROFILE && !silt_profile_sample(scene, out, def, &reference, history, result->note))
         goto done;
@@ -265,6 +276,8 @@ done:
 
 silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_check_result *result, silt_error *err) {
     verify_history history = {0};
+    verify_files files = {0};
+    free(silt_scene_named(scene, verify_name, &files));
     for (int i = 0; i < scene->n_check; i++) {
         const silt_check_def *def = &scene->check[i];
         result[i] = (silt_check_result){.name = def->name, .value = NAN, .reference = NAN, .error = NAN};
@@ -288,12 +301,13 @@ silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_ch
                 silt_curve_add(&curve, x, def->scale * (history.value[k * scene->n_check + i] + def->shift));
         }
         if (def->reference)
-            verify_curve_check(scene, out, i, &curve, &result[i]);
+            verify_curve_check(scene, out, &files, i, &curve, &result[i]);
         else
             verify_scalar_check(def, &curve, &result[i]);
         silt_curve_clear(&curve);
     }
     history_clear(&history);
+    verify_files_clear(&files);
     return status;
 }
 
@@ -327,41 +341,27 @@ static silt_status verify_copy_one(const char *base, const char *path, const cha
     return status;
 }
 
-// the resolved scene, where files are the copies
-static silt_status verify_scene(const silt_scene *scene, const char *out, const char *const *name, silt_error *err) {
-    char *path = silt_text("%s/scene.yaml", out), *aside = silt_text("%s.part", path);
-    char *text = silt_scene_text_named(scene, name);
+silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err) {
+    verify_files files = {0};
     silt_status status = SILT_OK;
-    FILE *to = fopen(aside, "w");
+    char *text = silt_scene_named(scene, verify_name, &files);
+    for (int i = 0; i < files.n && !status; i++) {
+        char *to = silt_text("%s/%s", out, files.name[i]);
+        status = verify_copy_one(scene->folder, files.path[i], to, err);
+        free(to);
+    }
+    char *path = silt_text("%s/scene.yaml", out), *aside = silt_text("%s.part", path);
+    FILE *to = status ? NULL : fopen(aside, "w");
     if (to)
         fputs(text, to);
-    if (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0)
+    if (!status && (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0))
         status = silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path, strerror(errno));
     if (to)
         fclose(to);
-    free(text);
     free(aside);
     free(path);
-    return status;
-}
-
-silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err) {
-    silt_status status = SILT_OK;
-    const char **file = NULL;
-    const int n = silt_scene_files(scene, &file);
-    char **name = silt_alloc((size_t)n + 1, sizeof *name);
-    for (int k = 0; k < n && !status; k++) {
-        name[k] = verify_copy_name(file, k);
-        char *to = silt_text("%s/%s", out, name[k]);
-        status = verify_copy_one(scene->folder, file[k], to, err);
-        free(to);
-    }
-    if (!status)
-        status = verify_scene(scene, out, (const char *const *)name, err);
-    for (int k = 0; k < n; k++)
-        free(name[k]);
-    free(name);
-    free(file);
+    free(text);
+    verify_files_clear(&files);
     return status;
 }
 

@@ -6,7 +6,8 @@
  *
  * In a step of the water:
  *   once    silt_depth_update, silt_wall_law_place
- *   in every iteration, with the present iterate w:
+ *   in iterations, with the present iterate w: the first two for water (later ones only unsettle the pressure), every one where
+ *   viscosity is stiff or changes much in a step
  *           silt_viscosity_update (blend 1 in the first, 0.5 after), silt_wall_law_traction
  *           momentum gets  - friction_i w_i + force_i  at wall nodes, friction_i joins the node's inertia
  */

@@ -136,18 +136,21 @@ static void test_gauges(void **state) {
         {.name = "turn", .kind = GAUGE_ANGULAR, .from = {0.1, 0.2, 0.3}},
         {.name = "middle", .kind = GAUGE_CENTROID, .from = {1}},
         {.name = "push", .kind = GAUGE_FORCE, .index = 1},
+        {.name = "p_in", .kind = GAUGE_PRESSURE, .from = {0.3, 0.6, 0.4}},
+        {.name = "v_in", .kind = GAUGE_VELOCITY, .from = {0.3, 0.6, 0.4}},
         {.name = "no_flow", .kind = GAUGE_DISCHARGE, .from = {0.5, 0}, .to = {0.5, 1}},
     };
     world w;
     silt_error err = {0};
     silt_gauges *gauges = NULL;
-    double value[24], force[2][3] = {{1, 2, 3}, {4, 5, 6}};
+    double value[28], force[2][3] = {{1, 2, 3}, {4, 5, 6}};
     char name[64];
     world_make(&w);
     w.scene.gauge = def;
     w.scene.n_gauge = sizeof def / sizeof def[0];
     w.view.wall_force = (const double(*)[3])force;
-    assert_int_equal(silt_gauges_count(&w.scene), 24);
+    assert_int_equal(silt_gauges_count(&w.scene), 28);
+    silt_locator_build(&w.locator, &w.mesh, cube_x, 0.5);
     silt_gauges_name(&w.scene, 14, name);
     assert_string_equal(name, "turn_x");
     assert_int_equal(silt_gauges_create(&gauges, &w.view, &err), SILT_OK);
@@ -174,7 +177,11 @@ static void test_gauges(void **state) {
         near(value[17 + d], sum[d] / total, 1e-14);
     for (int d = 0; d < 3; d++)
         assert_true(value[20 + d] == 4 + d);
-    assert_true(isnan(value[23]));
+    near(value[23], 10 - 1.6 + 0.3, 1e-13);
+    near(value[24], 1.8, 1e-13);
+    near(value[25], 0.9, 1e-13);
+    near(value[26], 0.6, 1e-13);
+    assert_true(isnan(value[27]));
 
     // all with one velocity: arm of the centre of mass times momentum
     for (int i = 0; i < 3 * CUBE_NODES; i++)
@@ -185,6 +192,7 @@ static void test_gauges(void **state) {
     near(value[15], 1000 * (arm[2] * 1 - arm[0] * 3), 1e-10);
     near(value[16], 1000 * (arm[0] * 2 - arm[1] * 1), 1e-10);
     silt_gauges_free(&gauges);
+    silt_locator_clear(&w.locator);
 }
 
 // ---------------------------------------------------------------- forces on walls

@@ -303,6 +303,46 @@ static void test_keys(void **state) {
     silt_scene_free(&again);
 }
 
+// every file that a scene reads goes with it; files of one name, and names that a run needs, get a number
+static void test_copies(void **state) {
+    (void)state;
+    silt_error err = {0};
+    silt_scene *scene = NULL, *again = NULL;
+    mkdir(place("far"), 0777);
+    mkdir(place("far/below"), 0777);
+    mkdir(place("far.out"), 0777);
+    make("far/gate.csv", "time,y\n0,0\n1,2\n");
+    make("far/below/gate.csv", "x,y\n0,0\n1,0\n1,1\n0,1\n");
+    make("far/history.csv", "t,x\n1,1\n2,4\n");
+    make("far/scene.yaml",
+         "silt: 1\n"
+         "time: {end: 10, output: 0.25}\n"
+         "gravity: [0, -9.81]\n"
+         "fluid: {density: 1000, viscosity: 0.001, size: 0.1, regions: [{outline: below/gate.csv}]}\n"
+         "walls: [{polyline: [[0, 2], [0, 0], [4, 0], [4, 2]]}, {polyline: [[1, 0], [1, 2]], motion: gate.csv}]\n"
+         "checks:\n"
+         "  - {name: a, column: time, reference: history.csv, tolerance: 0.1}\n"
+         "  - {name: b, profile: surface, at: 1, reference: history.csv, tolerance: 0.1}\n");
+    if (silt_scene_read(place("far/scene.yaml"), 0, NULL, &scene, &err))
+        fail_msg("%s", err.text);
+    if (silt_verify_copy(scene, place("far.out"), &err))
+        fail_msg("%s", err.text);
+    char command[1400];
+    snprintf(command, sizeof command, "rm -r '%s'", place("far"));
+    assert_int_equal(system(command), 0);
+    if (silt_scene_read(place("far.out/scene.yaml"), 0, NULL, &again, &err))
+        fail_msg("%s", err.text);
+    assert_true(again->wall[1].motion.n_row == 2 && again->fluid.region[0].n_point == 4);
+    assert_string_equal(content("far.out/2_history.csv"), "t,x\n1,1\n2,4\n");
+    assert_true(exists("far.out/gate.csv") && exists("far.out/1_gate.csv") && !exists("far.out/history.csv"));
+    assert_string_equal(again->check[0].reference, again->check[1].reference);
+    // and again from there, onto themselves
+    assert_int_equal(silt_verify_copy(again, place("far.out"), &err), SILT_OK);
+    assert_string_equal(content("far.out/2_history.csv"), "t,x\n1,1\n2,4\n");
+    silt_scene_free(&scene);
+    silt_scene_free(&again);
+}
+
 // ---------------------------------------------------------------- verify, summary, info
 
 static void test_verify(void **state) {
@@ -367,7 +407,7 @@ static void test_verify(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_checks_scalar), cmocka_unit_test(test_checks_decay), cmocka_unit_test(test_checks_curve),
-        cmocka_unit_test(test_keys),          cmocka_unit_test(test_verify),
+        cmocka_unit_test(test_keys),          cmocka_unit_test(test_copies),       cmocka_unit_test(test_verify),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
