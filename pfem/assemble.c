@@ -126,7 +126,11 @@ KERNEL geometry(const int D, silt_fluid *f, const silt_step *s, double dt) {
         f->inertia[i] = mesh->wet[i] ? f->mass[i] / theta_dt + (s->drag ? s->drag->coefficient[i] : 0) + f->friction[i] : 1;
 }
 
-void silt_assemble_geometry(silt_fluid *f, const silt_step *step, double dt) { BY_DIM(geometry, f, step, dt); }
+void silt_assemble_geometry(silt_fluid *f, const silt_step *step, double dt) {
+    BY_DIM(geometry, f, step, dt);
+    if (f->wall_normals.n_row)
+        silt_hold_bent(f, step);
+}
 
 KERNEL pressure(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, double *lost) {
     for (int e = 0; e < f->n_cell; e++) {
@@ -249,9 +253,10 @@ KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const doubl
     }
 }
 
-void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_drag *drag, const double *v, const double *p) {
+void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
+                              const double *p) {
     for (int j = 0; j < f->n_node; j++) {
-        const double asked = -f->rate[j] - (drag ? drag->source[j] : 0);
+        const double asked = -(rate ? rate[j] : 0) - (drag ? drag->source[j] : 0);
         f->residual[j] = f->mobile[j] == 1 ? asked : 0;
         f->withheld[j] = f->mobile[j] == 1 ? 0 : asked;
     }

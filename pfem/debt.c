@@ -7,6 +7,29 @@ static double gravity_size(const silt_scene *scene) {
     return sqrt(silt_square(scene->gravity[0]) + silt_square(scene->gravity[1]) + silt_square(scene->gravity[2]));
 }
 
+// a piece of water without free surface can neither grow nor shrink: there debts only move
+static void keep_closed(silt_fluid *f, const silt_mesh *mesh) {
+    int *parent = silt_alloc((size_t)f->n_node + 1, sizeof *parent);
+    double *rate = silt_alloc((size_t)f->n_node + 1, sizeof *rate), *volume = silt_alloc((size_t)f->n_node + 1, sizeof *volume);
+    for (int i = 0; i < f->n_node; i++)
+        parent[i] = i;
+    for (int e = 0; e < f->n_cell; e++)
+        silt_group_join(parent, mesh->cell[e]);
+    for (int i = 0; i < f->n_node; i++) {
+        const int r = silt_group_find(parent, i);
+        rate[r] += f->rate[i];
+        volume[r] += mesh->surface[i] ? HUGE_VAL : f->volume[i];
+    }
+    for (int i = 0; i < f->n_node; i++) {
+        const int r = silt_group_find(parent, i);
+        if (isfinite(volume[r]) && volume[r] > 0)
+            f->rate[i] -= rate[r] * f->volume[i] / volume[r];
+    }
+    free(parent);
+    free(rate);
+    free(volume);
+}
+
 void silt_debts_ask(silt_fluid *f, const silt_step *s) {
     const silt_mesh *mesh = s->mesh;
     double *debt = s->nodes->debt;
@@ -35,6 +58,7 @@ void silt_debts_ask(silt_fluid *f, const silt_step *s) {
     for (int i = 0; i < f->n_node; i++)
         if (mesh->wet[i])
             f->rate[i] = silt_clamp(debt[i], -DEBT_CAP * f->volume[i], DEBT_CAP * f->volume[i]) / time;
+    keep_closed(f, mesh);
 }
 
 bool silt_debts_relent(silt_fluid *f) {

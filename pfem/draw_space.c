@@ -349,8 +349,7 @@ static void space_frame(space *s) {
 
 void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, int n_frame) {
     silt_walls walls = {0};
-    if (silt_walls_create(&walls, c->scene, NULL) != SILT_OK) // a file that is gone since the run is no reason not to draw
-        silt_walls_clear(&walls);
+    silt_walls_create(&walls, c->scene, NULL); // a file that has gone leaves the picture without walls
     double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
     c->low = HUGE_VAL, c->high = -HUGE_VAL;
     int samples = n_frame < DRAW_SAMPLES ? n_frame : DRAW_SAMPLES;
@@ -429,8 +428,7 @@ void silt_draw_space(silt_draw_canvas *c, const silt_frame_entry *entry) {
         s.depth[k] = -HUGE_VALF;
         s.ink[k][0] = s.ink[k][1] = s.ink[k][2] = 1;
     }
-    if (silt_walls_create(&walls, c->scene, NULL) != SILT_OK) // a file that is gone since the run is no reason not to draw
-        silt_walls_clear(&walls);
+    silt_walls_create(&walls, c->scene, NULL); // a file that has gone leaves the picture without walls
     silt_walls_move(&walls, c->scene, entry->time, 0);
     if (walls.corner)
         space_walls(&s, &walls);

@@ -6,7 +6,7 @@
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 
 void silt_fluid_clear(silt_fluid *f) {
-    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->inverse, f->mu, f->tau, f->share, f->belt, f->mass, f->volume,
+    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->inverse, f->mu, f->tau, f->share, f->belt, f->wall_force, f->shift, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
                        f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->normal, f->given, f->cg[0],
                        f->cg[1], f->cg[2]};
@@ -17,6 +17,8 @@ void silt_fluid_clear(silt_fluid *f) {
     silt_pressure_free(&f->pressure);
     silt_mix_free(&f->mix);
     silt_wall_normals_clear(&f->wall_normals);
+    silt_depth_clear(&f->depth);
+    silt_wall_law_clear(&f->law);
     *f = (silt_fluid){0};
 }
 
@@ -79,6 +81,8 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
             belts |= s->scene->wall[k].velocity[d] != 0;
     if (belts)
         SILT_RESERVE(f->belt, f->belt_capacity, D * n_node + 1);
+    if (s->scene->fluid.volume_control)
+        SILT_RESERVE(f->shift, f->shift_capacity, D * n_node + 1);
     f->n_node = n_node;
     f->n_cell = n_cell;
 }
@@ -132,7 +136,42 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
             for (int d = 0; d < D; d++)
                 out[D * i + d] += f->mass[i] * a[d];
         }
+    if (f->law.n_point)
+        for (int k = 0; k < D * f->n_node; k++)
+            out[k] += f->wall_force[k];
+    if (s->pockets)
+        silt_pockets_force(s->pockets, D, 0.5 * s->dt, f->w, out);
     silt_assemble_pressure(f, s->mesh, p, out, NULL);
+}
+
+// resistance of the present iterate: traction of walls, then geometry, then viscosity of every cell
+static void resist(silt_fluid *f, const silt_step *s) {
+    if (f->law.n_point) {
+        memset(f->friction, 0, (size_t)f->n_node * sizeof *f->friction);
+        memset(f->wall_force, 0, (size_t)(f->dim * f->n_node) * sizeof *f->wall_force);
+        silt_wall_law_traction(&f->law, s->scene, f->dim, f->w, f->friction, f->wall_force);
+    }
+    silt_assemble_geometry(f, s, s->dt);
+    if (silt_viscosity_varies(s->scene))
+        silt_viscosity_update(s->scene, s->nodes, s->mesh, &f->depth, f->flux, f->inverse, f->w, f->iterations ? 0.5 : 1, f->mu,
+                              &f->viscosity);
+}
+
+// what resistance needs once a step
+static void resist_begin(silt_fluid *f, const silt_step *s) {
+    for (int e = 0; e < f->n_cell; e++)
+        f->mu[e] = s->scene->fluid.viscosity;
+    memset(f->friction, 0, (size_t)f->n_node * sizeof *f->friction);
+    if (silt_viscosity_varies(s->scene))
+        silt_depth_update(&f->depth, s->scene, s->walls, s->nodes, s->mesh, s->nodes->x);
+    bool law = s->scene->bed.on && s->scene->bed.condition == WALL_LAW;
+    for (int k = 0; k < s->scene->n_wall; k++)
+        law |= s->scene->wall[k].condition == WALL_LAW;
+    if (!law)
+        return;
+    silt_wall_law_place(&f->law, s->scene, s->walls, s->nodes, s->mesh, s->nodes->x);
+    if (f->law.n_point)
+        SILT_RESERVE(f->wall_force, f->wall_capacity, f->dim * f->n_node + 1);
 }
 
 // velocity with the pressure of the last iterate, from the right side in f->force
@@ -140,6 +179,8 @@ static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid,
     const int D = f->dim;
     if (s->scene->fluid.scheme == SCHEME_IMPLICIT && viscid) {
         memcpy(f->star, f->w, (size_t)D * (size_t)f->n_node * sizeof(double));
+        for (int i = 0; i < f->n_node && f->wall_normals.n_row; i++)
+            silt_hold_impose(f, i, f->star + D * i); // normals that have changed with the midpoint mesh
         SILT_TRY(silt_momentum_solve(f, s, f->force, f->star, err));
     } else {
         if (viscid)
@@ -215,14 +256,14 @@ static double kinetic_energy(const silt_fluid *f, const silt_step *s, const doub
 static silt_status project_start(silt_fluid *f, const silt_step *s, const double *p, silt_error *err) {
     const int D = f->dim;
     double *v = s->nodes->v;
+    silt_assemble_geometry(f, s, 0);
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i])
-            silt_hold_impose(f, i, v + D * i);
-    silt_assemble_geometry(f, s, 0);
+            silt_hold_turn(f, i, v + D * i);
     silt_assemble_projection(f, s->mesh, p);
     const double before = kinetic_energy(f, s, v);
     for (int pass = 0; pass < 2; pass++) {
-        silt_assemble_continuity(f, s->mesh, s->drag, v, p);
+        silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
         SILT_TRY(pressure_increment(f, s, 1e-4, err));
         correct(f, s, f->increment, v);
     }
@@ -230,6 +271,25 @@ static silt_status project_start(silt_fluid *f, const silt_step *s, const double
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i])
             memcpy(f->w + D * i, v + D * i, (size_t)D * sizeof(double));
+    return SILT_OK;
+}
+
+// Debts are paid by moving the nodes, not by pushing the water: a velocity without momentum, shift = P G q / inertia with
+// div shift = rate on the midpoint mesh, carries positions beside w. Asked of w itself the payment would be an impulse every step.
+static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err) {
+    const int D = f->dim;
+    bool any = false;
+    for (int i = 0; i < f->n_node && !any; i++)
+        any = f->rate[i] != 0;
+    memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);
+    for (int pass = 0; pass < 4 && any; pass++) {
+        memset(f->increment, 0, (size_t)f->n_node * sizeof *f->increment);
+        silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
+        for (int i = 0; i < f->n_node; i++)
+            f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
+        SILT_TRY(pressure_increment(f, s, 1e-3, err));
+        correct(f, s, f->increment, f->shift);
+    }
     return SILT_OK;
 }
 
@@ -313,7 +373,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         double tick = silt_seconds();
         if (s->drag && s->drag->update)
             s->drag->update(s->drag->self, f->w, p, s->dt);
-        silt_assemble_geometry(f, s, s->dt);
+        resist(f, s);
         if (f->iterations == 0) {
             silt_mobile_find(f, s->mesh, p);
             f->seconds_assemble += silt_seconds() - tick;
@@ -321,14 +381,18 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             SILT_TRY(silt_pressure_factor(f->pressure, f, s, stiffness(f, s) > FLUID_STIFF, err));
             f->seconds_solve += silt_seconds() - tick;
             tick = silt_seconds();
-            if (def->theta < 0.75 && !s->drag) {
+            if (def->theta < 0.75 && !s->drag)
                 SILT_TRY(project_start(f, s, p, err));
+            if (f->shift) {
                 silt_assemble_geometry(f, s, s->dt);
+                SILT_TRY(shift_find(f, s, err));
             }
+            resist(f, s);
         }
         if (f->iterations == 0 || !consistent)
             silt_assemble_projection(f, s->mesh, p);
         const double stiff = stiffness(f, s);
+        const bool squeezed = s->pockets && silt_pockets_stiff(s->pockets, D, 0.5 * s->dt, f->mass) > 0.1;
         momentum_right(f, s, p, f->force);
         const bool refresh = (first && stiff <= FLUID_STIFF) || f->iterations < FLUID_REFRESH;
         if (refresh)
@@ -336,7 +400,10 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
         SILT_TRY(velocity_star(f, s, stiff > 0, err));
-        silt_assemble_continuity(f, s->mesh, s->drag, f->star, p);
+        if (f->shift)
+            for (int k = 0; k < D * f->n_node; k++)
+                f->scratch[k] = f->star[k] + f->shift[k];
+        silt_assemble_continuity(f, s->mesh, s->drag, f->rate, f->shift ? f->scratch : f->star, p);
         f->seconds_assemble += silt_seconds() - tick;
 
         const int worst_node = worst_residual(f, s);
@@ -377,7 +444,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             SILT_TRY(correct_stiff(f, err));
         for (int i = 0; i < f->n_node; i++)
             p[i] += f->increment[i];
-        if (stiff > FLUID_STIFF)
+        if (stiff > FLUID_STIFF || squeezed)
             silt_mix_next(f->mix, D, f->n_node, f->increment, f->residual, p, f->w);
         if (refresh)
             silt_assemble_projection(f, s->mesh, p);
@@ -401,14 +468,16 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         for (int d = 0; d < D; d++)
             f->w[D * i + d] = s->mesh->wet[i] ? nodes->v[D * i + d] : 0;
         if (s->mesh->wet[i])
-            silt_hold_impose(f, i, f->w + D * i);
+            silt_hold_turn(f, i, f->w + D * i);
         f->mobile[i] = 1;
         f->withheld[i] = f->residual[i] = 0;
     }
-    for (int e = 0; e < f->n_cell; e++)
-        f->mu[e] = def->viscosity;
-    silt_hold_friction(f, s);
+    resist_begin(f, s);
+    if (f->shift)
+        memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);
     silt_assemble_geometry(f, s, s->dt);
+    if (s->pockets)
+        silt_pockets_load(s->pockets, s->mesh, f->x_mid);
     silt_debts_ask(f, s);
 
     // kept apart until the step is accepted

@@ -6,7 +6,8 @@
 #ifndef SILT_FLUID_H
 #define SILT_FLUID_H
 
-#include "pfem.h"
+#include "pocket.h"
+#include "viscosity.h"
 
 typedef struct silt_pressure silt_pressure; // the pressure matrix and its factor, pressure.c
 typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
@@ -16,15 +17,15 @@ typedef struct silt_step {
     const silt_scene *scene;
     const silt_walls *walls;
     const silt_mesh *mesh;
-    const silt_locator *locator; // of the mesh at the start of the step; NULL: the wall law samples at the wall
     const silt_drag *drag;       // NULL without grains in the water
+    silt_pockets *pockets;       // NULL where air has no pressure
     silt_nodes *nodes;
     double time, dt;             // s, start and length
 } silt_step;
 
 /** working space and results of a step; arrays grow only */
 typedef struct silt_fluid {
-    int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity;
+    int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity;
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
@@ -32,6 +33,8 @@ typedef struct silt_fluid {
     double *mu;           // owned, per cell, Pa s, effective viscosity
     double *tau;          // owned, per cell, stabilisation
     double *share;        // owned, dim + 1 per cell, int of solid share times N_i over the volume; NULL without grains
+    double *wall_force;   // owned, dim per node, N, explicit part of the law of the wall's traction; NULL without such walls
+    double *shift;        // owned, dim per node, m/s: carries positions, not momentum, to where debts are paid; NULL without volume control
     double *belt;         // owned, dim per node, velocity of a wall's surface along itself; NULL without such walls
     double *mass;         // owned, per node, lumped mass of water, kg
     double *volume;       // owned, per node, lumped volume of the cells
@@ -52,6 +55,9 @@ typedef struct silt_fluid {
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned
     silt_mix *mix;        // owned
+    silt_depth depth;     // owned, distances to walls and surface; empty where viscosity is the same everywhere
+    silt_wall_law law;    // owned
+    silt_viscosity_report viscosity; // of the last step
 
     // of the last step
     int iterations, momentum_iterations, pressure_iterations;
@@ -73,18 +79,23 @@ void silt_fluid_clear(silt_fluid *fluid);
  * positions move with, debts are paid by what was asked; positions are untouched. On failure the nodes are as before.
  * Errors: SILT_FAILED with what did not converge and where. */
 silt_status silt_fluid_step(silt_fluid *fluid, const silt_step *step, silt_error *err);
-/** velocity that the mesh moves with at node i (w, less a belt's own motion) */
-static inline double silt_mesh_velocity(const silt_fluid *f, int k) { return f->belt ? f->w[k] - f->belt[k] : f->w[k]; }
+/** component k of the velocity that the mesh moves with: w, the debts' shift, less a belt's own motion */
+static inline double silt_mesh_velocity(const silt_fluid *f, int k) {
+    return f->w[k] + (f->shift ? f->shift[k] : 0) - (f->belt ? f->belt[k] : 0);
+}
 
 // hold.c -------------------------------------------------------------------------------------------------
 /** which velocity components the surroundings hold, and at what velocity */
 void silt_hold_nodes(silt_fluid *fluid, const silt_step *step);
+/** Renews what holds nodes on bent walls, from the facets of the present midpoint mesh: with any other normals a full tank cannot
+ * keep its volume. */
+void silt_hold_bent(silt_fluid *fluid, const silt_step *step);
+/** silt_hold_impose; on bent walls the velocity keeps its size: turning does no work */
+void silt_hold_turn(const silt_fluid *fluid, int i, double *v);
 /** takes the held components out of a vector of dim numbers */
 void silt_hold_project(const silt_fluid *fluid, int i, double *v);
 /** v with its held components replaced by the given ones */
 void silt_hold_impose(const silt_fluid *fluid, int i, double *v);
-/** friction per node from the law of the wall at the velocity w */
-void silt_hold_friction(silt_fluid *fluid, const silt_step *step);
 
 // assemble.c ---------------------------------------------------------------------------------------------
 /** geometry, masses and stabilisation on the mesh half way along dt w; dt = 0: where the nodes are */
@@ -97,8 +108,9 @@ void silt_assemble_viscous(const silt_fluid *fluid, const silt_mesh *mesh, const
 void silt_assemble_viscous_diagonal(const silt_fluid *fluid, const silt_mesh *mesh, double *diagonal);
 /** out += (lumped - consistent mass) a */
 void silt_assemble_mass_excess(const silt_fluid *fluid, const silt_mesh *mesh, double density, const double *a, double *out);
-/** residual of continuity: G^T v + L p + Q pi - source - rate; where no velocity can mend it, of its smoothing alone */
-void silt_assemble_continuity(silt_fluid *fluid, const silt_mesh *mesh, const silt_drag *drag, const double *v, const double *p);
+/** residual of continuity: G^T v + L p + Q pi - source - rate (NULL: 0); where no velocity can mend it, of its smoothing alone */
+void silt_assemble_continuity(silt_fluid *fluid, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
+                              const double *p);
 /** pi = -M^-1 Q^T p: the recovered pressure gradient, lumped */
 void silt_assemble_projection(silt_fluid *fluid, const silt_mesh *mesh, const double *p);
 /** out = G^T v + L p, without sources and projection (the pressure system applied) */

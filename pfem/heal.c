@@ -84,57 +84,77 @@ static bool ring_walk(const healer *s, int e, const int corner[4], int *ring, in
     return *n >= 3;
 }
 
-// Takes out the edge: the polygon of its ring is divided into triangles, each with one tetrahedron on either side, so that
-// the worst is as good as can be (Klincsek's dynamic programme).
+// triangles of a ring's polygon, each with a tetrahedron to either end of the edge; -2: not looked at yet
+typedef struct fan {
+    int n;
+    patch p;
+    double upper[HEAL_RING][HEAL_RING][HEAL_RING], lower[HEAL_RING][HEAL_RING][HEAL_RING];
+} fan;
+
+// the worse of a triangle's two cells; -1: worse than `least`
+static double fan_worst(fan *f, int i, int k, int j, double least) {
+    double *upper = &f->upper[i][k][j], *lower = &f->lower[i][k][j];
+    if (*upper == -2)
+        *upper = patch_quality(&f->p, 2 + i, 2 + k, 2 + j, 1);
+    if (*upper <= least)
+        return -1;
+    if (*lower == -2)
+        *lower = patch_quality(&f->p, 2 + i, 2 + j, 2 + k, 0);
+    return *lower <= least ? -1 : silt_min(*upper, *lower);
+}
+
+// Takes out the edge: the polygon of its ring is divided into triangles so that the worst cell is as good as can be
+// (Klincsek's dynamic programme), and of divisions with the same worst cell the one with the least sum of 1/quality.
 static void try_edge(const healer *s, int e, const int corner[4], remedy *best) {
     int ring[HEAL_RING], cell[HEAL_RING], n;
     if (!ring_walk(s, e, corner, ring, cell, &n))
         return;
-    patch p;
-    patch_put(s, &p, 0, s->mesh->cell[e][corner[0]]);
-    patch_put(s, &p, 1, s->mesh->cell[e][corner[1]]);
+    fan f = {.n = n};
+    patch_put(s, &f.p, 0, s->mesh->cell[e][corner[0]]);
+    patch_put(s, &f.p, 1, s->mesh->cell[e][corner[1]]);
     double before = HUGE_VAL, cost_before = 0;
     for (int k = 0; k < n; k++) {
-        patch_put(s, &p, 2 + k, ring[k]);
+        patch_put(s, &f.p, 2 + k, ring[k]);
         before = silt_min(before, s->draft->quality[cell[k]]);
         cost_before += 1 / silt_max(s->draft->quality[cell[k]], HEAL_TIE);
     }
-    const double bar = before + best->gain - HEAL_TIE;
-    double worst[HEAL_RING][HEAL_RING], cost[HEAL_RING][HEAL_RING], upper[HEAL_RING][HEAL_RING], lower[HEAL_RING][HEAL_RING];
+    for (int i = 0; i < n; i++)
+        for (int k = i + 1; k < n; k++)
+            for (int j = k + 1; j < n; j++)
+                f.upper[i][k][j] = f.lower[i][k][j] = -2;
+    const double bar = before + silt_max(best->gain - HEAL_TIE, HEAL_TIE);
+    double worst[HEAL_RING][HEAL_RING], cost[HEAL_RING][HEAL_RING];
     int split[HEAL_RING][HEAL_RING];
-    for (int i = 0; i + 1 < n; i++) {
-        worst[i][i + 1] = HUGE_VAL;
-        cost[i][i + 1] = 0;
-    }
-    for (int span = 2; span < n; span++)
+    for (int span = 1; span < n; span++)
         for (int i = 0; i + span < n; i++) {
             const int j = i + span;
-            worst[i][j] = -1;
-            cost[i][j] = HUGE_VAL;
+            worst[i][j] = span == 1 ? HUGE_VAL : -1;
             for (int k = i + 1; k < j; k++) {
-                const double least = silt_max(worst[i][j] - HEAL_TIE, bar);
-                double value = silt_min(worst[i][k], worst[k][j]);
-                if (value <= least)
+                const double least = silt_max(worst[i][j], bar), rest = silt_min(worst[i][k], worst[k][j]);
+                if (rest > least)
+                    worst[i][j] = silt_max(worst[i][j], silt_min(rest, fan_worst(&f, i, k, j, least)));
+            }
+        }
+    if (worst[0][n - 1] <= bar)
+        return;
+    const double least = worst[0][n - 1] - HEAL_TIE;
+    for (int span = 1; span < n; span++)
+        for (int i = 0; i + span < n; i++) {
+            const int j = i + span;
+            cost[i][j] = span == 1 ? 0 : HUGE_VAL;
+            for (int k = i + 1; k < j; k++) {
+                const double rest = cost[i][k] + cost[k][j];
+                if (!(rest < cost[i][j]) || fan_worst(&f, i, k, j, least) < 0)
                     continue;
-                const double over = patch_quality(&p, 2 + i, 2 + k, 2 + j, 1);
-                if (over <= least)
-                    continue;
-                const double under = patch_quality(&p, 2 + i, 2 + j, 2 + k, 0);
-                if (under <= least)
-                    continue;
-                value = silt_min(value, silt_min(over, under));
-                const double sum = cost[i][k] + cost[k][j] + 1 / over + 1 / under;
-                if (better(value, sum, worst[i][j], cost[i][j])) {
-                    worst[i][j] = value;
+                const double sum = rest + 1 / f.upper[i][k][j] + 1 / f.lower[i][k][j];
+                if (sum < cost[i][j]) {
                     cost[i][j] = sum;
                     split[i][j] = k;
-                    upper[i][j] = over;
-                    lower[i][j] = under;
                 }
             }
         }
     const double gain = worst[0][n - 1] - before, more = cost[0][n - 1] - cost_before;
-    if (gain <= HEAL_TIE || !better(gain, more, best->gain, best->cost))
+    if (!better(gain, more, best->gain, best->cost))
         return;
     best->gain = gain;
     best->cost = more;
@@ -146,14 +166,14 @@ static void try_edge(const healer *s, int e, const int corner[4], remedy *best) 
         top--;
         const int i = stack[top][0], j = stack[top][1], k = split[i][j], m = best->n_new;
         best->n_new += 2;
-        memcpy(best->fresh[m], (const int[4]){ring[i], ring[k], ring[j], p.node[1]}, sizeof best->fresh[m]);
-        memcpy(best->fresh[m + 1], (const int[4]){ring[i], ring[j], ring[k], p.node[0]}, sizeof best->fresh[m]);
-        best->quality[m] = upper[i][j];
-        best->quality[m + 1] = lower[i][j];
-        const int part[2][2] = {{i, k}, {k, j}};
+        memcpy(best->fresh[m], (const int[4]){ring[i], ring[k], ring[j], f.p.node[1]}, sizeof best->fresh[m]);
+        memcpy(best->fresh[m + 1], (const int[4]){ring[i], ring[j], ring[k], f.p.node[0]}, sizeof best->fresh[m]);
+        best->quality[m] = f.upper[i][k][j];
+        best->quality[m + 1] = f.lower[i][k][j];
+        const int piece[2][2] = {{i, k}, {k, j}};
         for (int q = 0; q < 2; q++)
-            if (part[q][1] - part[q][0] > 1)
-                memcpy(stack[top++], part[q], sizeof part[q]);
+            if (piece[q][1] - piece[q][0] > 1)
+                memcpy(stack[top++], piece[q], sizeof piece[q]);
     }
 }
 

@@ -25,6 +25,38 @@ void silt_hold_impose(const silt_fluid *f, int i, double *v) {
             v[d] += f->given[f->dim * i + d];
 }
 
+void silt_hold_turn(const silt_fluid *f, int i, double *v) {
+    const int D = f->dim;
+    double whole = 0, along = 0;
+    if (!f->wall_normals.n_row || f->wall_normals.row[i] < 0 || f->hold[i] != HOLD_NORMAL) {
+        silt_hold_impose(f, i, v);
+        return;
+    }
+    for (int d = 0; d < D; d++) {
+        v[d] -= f->given[D * i + d];
+        whole += v[d] * v[d];
+    }
+    silt_hold_project(f, i, v);
+    for (int d = 0; d < D; d++)
+        along += v[d] * v[d];
+    const double factor = along > 0.5 * whole ? sqrt(whole / along) : 1;
+    for (int d = 0; d < D; d++)
+        v[d] = f->given[D * i + d] + factor * v[d];
+}
+
+void silt_hold_bent(silt_fluid *f, const silt_step *s) {
+    const int D = f->dim;
+    silt_wall_normals_take(&f->wall_normals, s->walls, s->nodes, s->mesh, f->x_mid);
+    for (int i = 0; i < f->n_node; i++) {
+        if (s->nodes->kind[i] != NODE_FLUID || f->wall_normals.row[i] < 0)
+            continue;
+        double vector[3], given[3];
+        f->hold[i] = (uint8_t)silt_walls_held(s->walls, s->scene, &f->wall_normals, s->nodes, i, vector, given);
+        memcpy(f->normal + D * i, vector, (size_t)D * sizeof(double));
+        memcpy(f->given + D * i, given, (size_t)D * sizeof(double));
+    }
+}
+
 // slip on the bed: the normal of its facets around the node
 static void hold_bed(silt_fluid *f, const silt_step *s) {
     const silt_mesh *mesh = s->mesh;
@@ -58,7 +90,7 @@ void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
     memset(f->given, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
     if (f->belt)
         memset(f->belt, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
-    silt_wall_normals_take(&f->wall_normals, s->walls, nodes, s->mesh);
+    silt_wall_normals_take(&f->wall_normals, s->walls, nodes, s->mesh, nodes->x);
     for (int i = 0; i < f->n_node; i++) {
         double vector[3] = {0}, given[3];
         f->hold[i] = HOLD_ALL;
@@ -77,56 +109,4 @@ void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
     }
     if (s->scene->bed.on && s->scene->bed.condition != WALL_NO_SLIP)
         hold_bed(f, s);
-}
-
-// u*^2/u of the law of the wall for the speed u at the height y: u/u* = ln(9.8 y u*/nu)/kappa on a smooth wall, or
-// ln(30 y/k_s)/kappa on a rough one, whichever resists more; linear below y+ = 11
-static double wall_law(double speed, double y, double nu, double roughness) {
-    const double kappa = 0.41;
-    if (speed <= 0)
-        return 0;
-    double star = sqrt(nu * speed / y);
-    if (y * star > 11 * nu) {
-        // Newton on u* (ln(9.8 y u*/nu)/kappa) = u
-        star = 0.06 * speed;
-        for (int k = 0; k < 20; k++) {
-            const double log_part = log(silt_max(9.8 * y * star / nu, 2));
-            const double step = (star * log_part / kappa - speed) / ((log_part + 1) / kappa);
-            star = silt_max(star - step, 1e-3 * speed);
-            if (fabs(step) < 1e-12 * speed)
-                break;
-        }
-    }
-    if (roughness > 0)
-        star = silt_max(star, kappa * speed / log(silt_max(30 * y / roughness, 3)));
-    return star * star / speed;
-}
-
-// traction of the wall law on nodes that slide along walls and the bed, per speed; the water's speed at the wall's node
-// stands for the one at the height h
-void silt_hold_friction(silt_fluid *f, const silt_step *s) {
-    const silt_mesh *mesh = s->mesh;
-    const silt_nodes *nodes = s->nodes;
-    memset(f->friction, 0, (size_t)f->n_node * sizeof *f->friction);
-    if (f->dim != 2)
-        return;
-    const double h = s->scene->fluid.size, rho = s->scene->fluid.density, nu = s->scene->fluid.viscosity / rho;
-    for (int k = 0; k < mesh->n_facet; k++) {
-        const int *edge = mesh->facet[k];
-        double roughness = -1;
-        if (mesh->facet_kind[k] == FACET_BED && s->scene->bed.condition == WALL_LAW)
-            roughness = 2.5 * s->scene->grains.diameter;
-        else if (mesh->facet_kind[k] == FACET_WALL)
-            for (int a = 0; a < 2; a++)
-                for (int b = 0; b < 2; b++)
-                    if (nodes->wall[edge[0]][a] >= 0 && nodes->wall[edge[0]][a] == nodes->wall[edge[1]][b])
-                        roughness = s->walls->roughness[nodes->wall[edge[0]][a]];
-        if (roughness < 0)
-            continue;
-        const double length = hypot(nodes->x[2 * edge[1]] - nodes->x[2 * edge[0]], nodes->x[2 * edge[1] + 1] - nodes->x[2 * edge[0] + 1]);
-        for (int c = 0; c < 2; c++) {
-            const double speed = hypot(f->w[2 * edge[c]], f->w[2 * edge[c] + 1]);
-            f->friction[edge[c]] += 0.5 * length * rho * wall_law(speed, h, nu, roughness);
-        }
-    }
 }

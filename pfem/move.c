@@ -275,7 +275,11 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     const double fed = silt_mesh_volume(mesh, nodes->x);
     run->ledger.inflow_mass += rho * (fed - moved);
     run->ledger.volume_solved += run->fluid.solved_volume;
+    run->ledger.volume_given += run->fluid.given_back;
     run->ledger.volume_moved += moved - before - run->fluid.solved_volume - run->fluid.given_back;
+    if (scene->fluid.air_pressure > 0)
+        silt_pockets_advance(&run->pockets, scene, mesh, run->x_old, nodes->x);
+    silt_nodes_shuffle(nodes, mesh, scene, run->step);
     silt_memory_take(&run->memory, mesh, nodes);
 
     // from here on positions are mended: what that does to the volume is booked by the rebuild
@@ -302,14 +306,12 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     hand_on_landing(run, run->wall_before, run->v_before);
     let_out(run);
     expel(run);
-    mesh->walls = &run->walls;
     silt_mesh_refine(mesh, nodes, &run->memory, h);
 
     const double middle = silt_seconds();
     run->phase[PHASE_move] += middle - since;
     SILT_RESERVE(run->map, run->map_capacity, nodes->count + 1);
     SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
-    silt_nodes_hand_on(nodes, mesh, &run->memory, run->map);
     run->ledger.volume_reconnected += run->memory.reconnected;
     // without an outlet nothing may leave: what does anyway shows as a volume error
     if (scene->fluid.n_outlet)
@@ -317,6 +319,8 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     for (int k = 0; k < run->bed.n_node; k++)
         if (run->bed.fluid_node[k] >= 0)
             run->bed.fluid_node[k] = run->map[run->bed.fluid_node[k]];
+    silt_size_update(run->size, nodes, mesh);
+    SILT_TRY(silt_run_pockets(run, err));
     silt_locator_build(&run->locator, mesh, nodes->x, h);
     run->phase[PHASE_mesh] += silt_seconds() - middle;
     return SILT_OK;

@@ -99,7 +99,10 @@ typedef struct silt_wall_normals {
     double (*normal)[3][3]; // owned, one for each of the node's elements, unit
 } silt_wall_normals;
 struct silt_mesh;
-void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls, const silt_nodes *nodes, const struct silt_mesh *mesh);
+/** @param x  positions that the facets have when what passes through them is counted: those of the midpoint mesh. Normals of any
+ * other moment leave a rest that a full tank can only answer with a pressure without bounds. */
+void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls, const silt_nodes *nodes, const struct silt_mesh *mesh,
+                            const double *x);
 void silt_wall_normals_clear(silt_wall_normals *normals);
 /** silt_walls_hold and silt_walls_given in one, with those normals. @param normals  NULL: the elements' */
 silt_hold silt_walls_held(const silt_walls *walls, const silt_scene *scene, const silt_wall_normals *normals, const silt_nodes *nodes,
@@ -157,7 +160,6 @@ double silt_size_at(const silt_size *size, const silt_scene *scene, const double
 void silt_size_free(silt_size **size);
 /** signed distance from a region, m, negative inside; dim 3: polygons are upright prisms in x-z, circles are spheres */
 double silt_region_distance(const silt_region *region, int dim, const double *x);
-void silt_region_span(const silt_region *region, int dim, double lo[3], double hi[3]); /**< its bounds, m */
 
 // ---------------------------------------------------------------- mesh (mesh.c)
 
@@ -226,8 +228,6 @@ typedef struct silt_memory {
     int n_node, flag_capacity, dead_capacity;
     uint8_t *interior; // owned, one per node: had cells and no free facet
     uint8_t *dead;     // owned, one per node: leaves the cloud at the rebuild; NODE_LEFT: takes its water out of the domain
-    int momentum_capacity;
-    double *momentum;  // owned, dim + 1 per cell: its volume times mean velocity, m4/s, and volume, m3, when the cloud was edited
     double reconnected;     // m3, volume that the rebuild itself made (positive) or lost
     double left;            // m3, volume that went with the nodes that left
     int flat;               // 3-D: cells flatter than a fiftieth of h that could not be mended
@@ -246,12 +246,10 @@ void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nod
 /** Makes the memory's flags as long as the cloud is now. */
 void silt_memory_extend(silt_memory *memory, int n_node);
 /** Marks crowded nodes dead and adds nodes where the mesh is stretched, against the local size (refine.c). Nodes added on
- * curved walls are put onto them (mesh->walls).
+ * curved walls are put onto them (mesh->walls); velocity and pressure are those of the edge they split. The momentum that this
+ * moves is silt_momentum_hand_on's business.
  * @param h  fluid.size */
 void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h);
-/** After the rebuild: what cells that came and went together held as momentum, their nodes have again (refine.c).
- * @param map  of the rebuild */
-void silt_nodes_hand_on(silt_nodes *nodes, const silt_mesh *mesh, const silt_memory *memory, const int *map);
 /** Shifts inner nodes by up to fluid.shuffle * h in each direction, their pressure and velocity with them along the mesh's
  * gradients. The random numbers hang on fluid.seed, the step and the node's id. Before silt_memory_take. */
 void silt_nodes_shuffle(silt_nodes *nodes, const silt_mesh *mesh, const silt_scene *scene, int64_t step);
@@ -274,9 +272,10 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
                               silt_memory *memory, int *map, silt_error *err);
 
 /** Hands on momentum when a rebuild has changed the nodes' share of the water (momentum.c). With masses that count the debts,
- * m = density (share of the cells + debt), sum m v stays to rounding, kinetic energy does not grow and no velocity leaves the
- * range of its group and neighbours; prescribed velocities and the walls' normals are kept. Old numbering is the memory's, with
- * the nodes that refinement added.
+ * m = density (share of the cells + debt), sum m v stays to rounding; no velocity leaves the range of its group and neighbours;
+ * a group's kinetic energy does not rise above the larger of what it was and what it would be with velocities as they are (so
+ * that a linear field, whose momentum no change of mesh alters, is left alone); prescribed velocities and the walls' normals are
+ * kept. Old numbering is the memory's, with the nodes that refinement added.
  * @param memory  of the rebuild just made, with record set before it
  * @param mesh    the new one
  * @param mass    kg, old numbering: masses to use in place of m; NULL: m before the rebuild

@@ -1,4 +1,4 @@
-// the cloud's density: crowded nodes leave, stretched places get nodes, and momentum is handed on when cells change
+// the cloud's density: crowded nodes leave, stretched places get nodes
 #include "pfem.h"
 
 /* Lengths are held against h, the mean of the local sizes of both ends. Candidates are taken in the order of how far off they
@@ -11,7 +11,6 @@
 #define REFINE_LONG 1.5     // edges longer than this times h get nodes
 #define REFINE_ROOM 0.6     // but none nearer than this times h to another; on the boundary
 #define REFINE_RIM 0.36     // this: an edge of the surface that is not split tears, what is crowded by its node leaves
-#define HAND_VOLUME 0.05    // momentum is handed on where cells that changed kept their volume but for this share
 #define REFINE_PIECES 4     // into which an edge is split at most
 // cells smaller than this times h^dim are films: they break rather than fill with nodes
 static const double refine_film[4] = {0, 0, 0.25, 0.068};
@@ -26,7 +25,6 @@ void silt_memory_clear(silt_memory *memory) {
     free(memory->x);
     free(memory->group_start);
     free(memory->exchange);
-    free(memory->momentum);
     *memory = (silt_memory){0};
 }
 
@@ -488,30 +486,11 @@ static void refine_stretched(refinement *r) {
     free(r->fresh_node);
 }
 
-// volume and momentum of the cells that were water, before they are taken apart
-static void refine_remember(refinement *r) {
-    silt_memory *memory = r->memory;
-    const int dim = r->dim;
-    SILT_RESERVE(memory->momentum, memory->momentum_capacity, 4 * memory->n_cell + 4);
-    for (int e = 0; e < memory->n_cell; e++) {
-        double *m = memory->momentum + (dim + 1) * e;
-        const double volume = cell_measure(r->mesh, r->nodes->x, memory->cell[e]);
-        for (int d = 0; d < dim; d++) {
-            m[d] = 0;
-            for (int a = 0; a <= dim; a++)
-                m[d] += r->nodes->v[dim * memory->cell[e][a] + d];
-            m[d] *= volume / (dim + 1);
-        }
-        m[dim] = volume;
-    }
-}
-
 void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h) {
     refinement r = {.mesh = mesh, .nodes = nodes, .memory = memory, .walls = mesh->walls, .dim = silt_nodes_dim(nodes), .h = h};
     r.locked = silt_alloc((size_t)mesh->n_node + 1, 1);
     for (int i = 0; i < mesh->n_node; i++)
         r.locked[i] = memory->dead[i];
-    refine_remember(&r);
     refine_facets(&r);
     refine_crowded(&r);
     refine_flat(&r);
@@ -520,121 +499,6 @@ void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *mem
     free(r.facet);
     free(r.list);
     free(r.locked);
-}
-
-// ---- after the rebuild
-
-// the new mesh's cell with the old cell's nodes, or -1
-static int hand_find(const silt_mesh *mesh, int dim, const int *cell, const int *map) {
-    int at[4];
-    for (int a = 0; a <= dim; a++)
-        if ((at[a] = map[cell[a]]) < 0)
-            return -1;
-    for (int k = mesh->node_cell_start[at[0]]; k < mesh->node_cell_start[at[0] + 1]; k++) {
-        const int *other = mesh->cell[mesh->node_cell[k]];
-        int same = 0;
-        for (int a = 0; a <= dim; a++)
-            for (int b = 0; b <= dim; b++)
-                same += at[a] == other[b];
-        if (same == dim + 1)
-            return mesh->node_cell[k];
-    }
-    return -1;
-}
-
-// what walls and other owners let a node take
-static void hand_hold(const silt_nodes *nodes, const silt_mesh *mesh, int i, double dv[3]) {
-    double vector[3];
-    silt_hold hold = nodes->kind[i] == NODE_FLUID ? HOLD_FREE : HOLD_ALL;
-    if (hold == HOLD_FREE && nodes->wall[i][0] >= 0)
-        hold = mesh->walls ? silt_walls_hold(mesh->walls, nodes->wall[i], vector) : HOLD_ALL;
-    if (hold == HOLD_FREE)
-        return;
-    const double along = hold == HOLD_ALL ? 0 : dv[0] * vector[0] + dv[1] * vector[1] + dv[2] * vector[2];
-    for (int d = 0; d < 3; d++)
-        dv[d] = hold == HOLD_ALL ? 0 : hold == HOLD_LINE ? along * vector[d] : dv[d] - along * vector[d];
-}
-
-/* Lumped masses jump when cells change. A group is the nodes of cells that came or went together, as for the volume; P is the
- * sum of cell volume times mean velocity, before and after, V the volume. The group's nodes take
- * dv = (P_old - P_new - (V_old - V_new) P_old/V_old)/M, M their lumped volumes: linear momentum is kept to rounding where
- * volume is, and a velocity that is linear in space changes by nothing. What falls to nodes that are held, the wall takes. */
-void silt_nodes_hand_on(silt_nodes *nodes, const silt_mesh *mesh, const silt_memory *memory, const int *map) {
-    const int dim = silt_nodes_dim(nodes), n_old = memory->n_node, n = nodes->count;
-    int *parent = silt_alloc((size_t)n_old + 1, sizeof *parent), *back = silt_alloc((size_t)n + 1, sizeof *back);
-    uint8_t *kept = silt_alloc((size_t)mesh->n_cell + 1, 1), *gone = silt_alloc((size_t)memory->n_cell + 1, 1);
-    uint8_t *touched = silt_alloc((size_t)n + 1, 1);
-    int changed = 0;
-    for (int i = 0; i < n_old; i++) {
-        parent[i] = i;
-        if (map[i] >= 0)
-            back[map[i]] = i;
-    }
-    for (int e = 0; e < memory->n_cell; e++) {
-        const int found = hand_find(mesh, dim, memory->cell[e], map);
-        gone[e] = found < 0;
-        if (found >= 0)
-            kept[found] = 1;
-        else {
-            changed++;
-            silt_group_join(parent, memory->cell[e]);
-        }
-    }
-    for (int e = 0; e < mesh->n_cell; e++) {
-        if (kept[e])
-            continue;
-        int cell[4] = {-1, -1, -1, -1};
-        for (int a = 0; a <= dim; a++) {
-            cell[a] = back[mesh->cell[e][a]];
-            touched[mesh->cell[e][a]] = 1;
-        }
-        changed++;
-        silt_group_join(parent, cell);
-    }
-    if (changed) {
-        // per group: momentum and volume before, after, and the nodes' lumped volume
-        const int width = 2 * dim + 3;
-        double *sum = silt_alloc((size_t)n_old * (size_t)width + 1, sizeof *sum);
-        for (int e = 0; e < memory->n_cell; e++)
-            if (gone[e])
-                for (int d = 0; d <= dim; d++)
-                    sum[width * silt_group_find(parent, memory->cell[e][0]) + d] += memory->momentum[(dim + 1) * e + d];
-        for (int e = 0; e < mesh->n_cell; e++) {
-            if (kept[e])
-                continue;
-            double *s = sum + width * silt_group_find(parent, back[mesh->cell[e][0]]) + dim + 1;
-            const double volume = cell_measure(mesh, nodes->x, mesh->cell[e]);
-            for (int d = 0; d < dim; d++) {
-                double v = 0;
-                for (int a = 0; a <= dim; a++)
-                    v += nodes->v[dim * mesh->cell[e][a] + d];
-                s[d] += volume * v / (dim + 1);
-            }
-            s[dim] += volume;
-        }
-        for (int i = 0; i < n; i++) {
-            for (int k = mesh->node_cell_start[i]; touched[i] && k < mesh->node_cell_start[i + 1]; k++)
-                sum[width * silt_group_find(parent, back[i]) + width - 1] +=
-                    cell_measure(mesh, nodes->x, mesh->cell[mesh->node_cell[k]]) / (dim + 1);
-        }
-        for (int i = 0; i < n; i++) {
-            const double *s = sum + width * silt_group_find(parent, back[i]);
-            if (!touched[i] || !(s[dim] > 0) || !(s[width - 1] > 0) || fabs(s[dim] - s[2 * dim + 1]) > HAND_VOLUME * s[dim])
-                continue;
-            double dv[3] = {0};
-            for (int d = 0; d < dim; d++)
-                dv[d] = (s[d] * s[2 * dim + 1] / s[dim] - s[dim + 1 + d]) / s[width - 1];
-            hand_hold(nodes, mesh, i, dv);
-            for (int d = 0; d < dim; d++)
-                nodes->v[dim * i + d] += dv[d];
-        }
-        free(sum);
-    }
-    free(parent);
-    free(back);
-    free(kept);
-    free(gone);
-    free(touched);
 }
 
 // ---- a test of remeshing

@@ -498,11 +498,14 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
         cell_centre(mesh, scene, corner, centre);
         if (before[e] < 0 && !inner && !flat) {
             double weight[4];
-            int n_fluid = 0;
-            for (int a = 0; a <= dim; a++)
+            int n_fluid = 0, n_inner = 0;
+            for (int a = 0; a <= dim; a++) {
                 n_fluid += nodes->kind[cell[a]] == NODE_FLUID || nodes->kind[cell[a]] == NODE_INLET;
+                n_inner += memory->interior[cell[a]];
+            }
+            // in space a gap is between surfaces: a node from within has none to close
             keep = silt_locate(&locator, &gone, nodes->x, centre, weight) >= 0 ||
-                   (n_fluid > 0 && cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
+                   (n_fluid > 0 && (dim == 2 || n_inner == 0) && cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
         }
         if (!keep || cell_behind(mesh, nodes, barrier, cell, centre))
             continue;

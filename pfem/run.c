@@ -31,6 +31,7 @@ static void run_view(const silt_run *run, silt_view *view) {
         view->locator = &run->locator;
         view->solid = run->drag ? run->drag->solid : NULL;
         view->iterations = run->fluid.iterations;
+        view->wall_force = (const double(*)[3])run->wall_force;
     }
     if (scene->bed.on)
         view->bed = &run->bed;
@@ -93,6 +94,12 @@ static void ledger_take(silt_run *run) {
         ledger->fluid_volume -= run->waiting[k].mass / scene->bed.density;
     ledger->fluid_volume += ledger->flying_volume;
     ledger->fluid_mass = rho * ledger->fluid_volume;
+    ledger->volume_owed = 0;
+    for (int i = 0; i < nodes->count; i++)
+        ledger->volume_owed += run->mesh.wet[i] ? nodes->debt[i] : 0;
+    if (scene->fluid.on)
+        silt_water_moment(nodes, &run->mesh, run->drag ? run->drag->solid : NULL, rho, (const double[3]){0}, ledger->angular_momentum);
+    ledger->y_plus = run->fluid.law.n_point ? run->fluid.law.y_plus[1] : NAN;
     ledger->bed_mass = run->bed.solid_mass;
     ledger->pore_water_mass = run->bed.pore_water;
     ledger->grain_count = 0;
@@ -283,7 +290,8 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
             return status;
         }
         run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
-        const silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .locator = &run->locator, .drag = run->drag,
+        const silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
+                                .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
                                 .nodes = &run->nodes, .time = run->time, .dt = run->dt};
         status = silt_fluid_step(&run->fluid, &step, err);
         run->phase[PHASE_assemble] += run->fluid.seconds_assemble;
@@ -421,6 +429,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         SILT_TRY(status);
     }
     if (scene->fluid.on) {
+        silt_wall_forces(&run->walls, &run->nodes, &run->mesh, run->fluid.reaction, run->wall_force);
         SILT_TRY(silt_run_move(run, err));
         run->ledger.dissipation += run->fluid.dissipated;
         run->ledger.external_work += run->fluid.worked;
@@ -496,6 +505,10 @@ static void run_failed(silt_run *run, silt_error *err) {
 static void run_free(silt_run *run) {
     silt_coupling_dem.close(&run->coupling);
     silt_fluid_clear(&run->fluid);
+    silt_size_free(&run->size);
+    silt_air_clear(&run->air);
+    silt_pockets_clear(&run->pockets);
+    free(run->wall_force);
     silt_mesh_clear(&run->mesh);
     silt_memory_clear(&run->memory);
     silt_locator_clear(&run->locator);
@@ -538,6 +551,7 @@ static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_
     run->nodes.dim = run->mesh.dim = scene->dimension;
     run->mesh.period[0] = scene->period[1] - scene->period[0];
     run->gauge = silt_alloc((size_t)silt_gauges_count(scene) + 1, sizeof *run->gauge);
+    run->wall_force = silt_alloc((size_t)scene->n_wall + 1, sizeof *run->wall_force);
     SILT_TRY(silt_walls_create(&run->walls, scene, err));
     silt_run_box(run);
     return SILT_OK;

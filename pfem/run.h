@@ -33,6 +33,10 @@ struct silt_run {
     silt_memory memory;
     silt_locator locator;
     silt_fluid fluid;
+    silt_size *size;         // owned, NULL: fluid.size everywhere
+    silt_air air;            // empty where air has no pressure, as are the pockets
+    silt_pockets pockets;
+    double (*wall_force)[3]; // owned, one per wall of the scene, N, of the water in the last step
     silt_bed bed;
     silt_coupling *coupling; // owned, NULL without grains and bodies
     const silt_drag *drag;   // borrowed from the coupling, NULL: no grain in the water
@@ -86,6 +90,7 @@ struct silt_run {
 // start.c ---------------------------------------------------------------------------------------------
 void silt_run_box(silt_run *run);
 silt_status silt_run_first(silt_run *run, silt_error *err);
+silt_status silt_run_pockets(silt_run *run, silt_error *err); // closed air of a fresh mesh
 void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def);
 
 // move.c ----------------------------------------------------------------------------------------------

@@ -382,6 +382,12 @@ double silt_formula_surface(const silt_formula *formula, const double *x);
 int silt_formula_prepare(silt_formula *formula);
 void silt_formula_clear(silt_formula *formula); /**< frees series and field */
 
+/** The files that the scene reads, with their folders, in the order of the resolved text; the same file may come twice.
+ * @return how many; *file is owned by the caller, the names are the scene's */
+int silt_scene_files(const silt_scene *scene, const char ***file);
+/** the resolved text with file k called name[k]; owned by the caller */
+char *silt_scene_text_named(const silt_scene *scene, const char *const *name);
+
 /** Prints what the table of keys says: one line per key when key is NULL, a block's keys, or all about one key
  * ("fluid.size", "bodies.density"; a last part alone will do). Errors: SILT_INPUT, no such key, with the nearest. */
 silt_status silt_scene_help(const char *key, FILE *to, silt_error *err);

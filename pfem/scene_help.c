@@ -425,4 +425,23 @@ void silt_scene_document(FILE *to) {
             "numbers.\n`-D path=value` replaces or adds a key from the command line; list items by number or by their "
             "name:\n`-D fluid.size=0.01`, `-D bodies.0.density=700`, `-D bodies.temple.density=700`.\n\n");
     help_section(to, &silt_scene_keys, "", false);
+    fprintf(
+        to,
+        "\n## Formulas\n\n"
+        "With X = x - centre and Y = y - centre (3-D: z - centre); components along x and up; `vector` is added to "
+        "all.\n\n"
+        "| formula | field |\n|---|---|\n"
+        "| solid-rotation | rate about the centre, counter-clockwise; 3-D: right-handed about `axis` |\n"
+        "| shear, strain | (rate Y, 0); (-rate X, rate Y) |\n"
+        "| taylor-green | amplitude (sin(pi X/length) cos(pi Y/length), -cos(pi X/length) sin(pi Y/length)) |\n"
+        "| standing-wave | linear wave over a flat bed at Y = 0 whose surface is flat and rises as amplitude omega "
+        "cos(2 pi X/length), omega^2 = g k tanh(k depth) |\n"
+        "| solitary-wave | potential flow over a flat bed at Y = 0 under the surface depth (1 + s(X)), e = "
+        "amplitude/depth, S = sech^2(k X), T = 1 - S. boussinesq: s = e S, k depth = sqrt(3 e/4), c^2 = g depth (1 + "
+        "e). grimshaw: s = e S - 3/4 e^2 S T + e^3 (5/8 S T - 101/80 S^2 T), k depth = sqrt(3 e/4) (1 - 5/8 e + "
+        "71/128 e^2), c^2 = g depth (1 + e - e^2/20 - 3/70 e^3). A region's `outline` gives the surface |\n"
+        "| field | the values of a point at the point, linear on the Delaunay cells between points, the plane "
+        "through the nearest ones beside the cloud |\n"
+        "| central | -rate \\|rate\\| (X, Y), 3-D: from the point or from `axis` |\n"
+        "| series | x, y (z) of the file at the time, linear between rows, constant outside |\n");
 }

@@ -71,7 +71,7 @@ static const silt_word formula_words[] = {{"uniform", FORMULA_UNIFORM},
                                           {"solitary-wave", FORMULA_SOLITARY_WAVE},
                                           {"field", FORMULA_FIELD},
                                           {0}};
-static const silt_word profile_words[] = {{"boussinesq", WAVE_BOUSSINESQ}, {"grimshaw", WAVE_GRIMSHAW}, {0}};
+static const silt_word wave_words[] = {{"boussinesq", WAVE_BOUSSINESQ}, {"grimshaw", WAVE_GRIMSHAW}, {0}};
 static const silt_word force_words[] = {{"uniform", FORMULA_UNIFORM}, {"solid-rotation", FORMULA_SOLID_ROTATION},
                                         {"central", FORMULA_CENTRAL}, {"series", FORMULA_SERIES},
                                         {"field", FORMULA_FIELD},     {0}};
@@ -189,7 +189,7 @@ static const silt_key formula_rows[] = {
      .doc = "width of the Taylor-Green cell, wavelength of the standing wave"},
     {"depth", KEY_NUMBER, .unit = "m", POSITIVE, .when = FORMULA_WITH_DEPTH, AT(silt_formula, depth),
      .doc = "of the still water under the wave"},
-    {"profile", KEY_WORD, .fallback = "grimshaw", .words = profile_words, .when = ONLY(FORMULA_SOLITARY_WAVE),
+    {"profile", KEY_WORD, .fallback = "grimshaw", .words = wave_words, .when = ONLY(FORMULA_SOLITARY_WAVE),
      AT(silt_formula, profile),
      .doc = "of the solitary wave: amplitude times sech^2(k x), k^2 = 0.75 amplitude/depth^3, or to third order in "
             "amplitude/depth; the surface itself is given by a region, see outline"},

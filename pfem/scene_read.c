@@ -157,8 +157,8 @@ static bool read_two_points(read_state *state, const silt_key *key, const silt_t
         if (!read_point(state, key, node->item[i], path, x + 3 * i))
             return false;
     bool box = key->kind != KEY_SEGMENT, space = state->scene->dimension == 3;
-    bool sound = box ? x[0] < x[3] && x[1] < x[4] && (!space || x[2] < x[5])
-                     : x[0] != x[3] || x[1] != x[4] || x[2] != x[5];
+    bool sound =
+        box ? x[0] < x[3] && x[1] < x[4] && (!space || x[2] < x[5]) : x[0] != x[3] || x[1] != x[4] || x[2] != x[5];
     if (!sound) {
         char *allowed = silt_key_allowed(key, state->scene->dimension);
         if (space)

@@ -152,6 +152,7 @@ static void settle_wall(silt_reader *reader, const silt_scene *scene, silt_wall 
         // its four corners, counter-clockwise
         const double *lo = wall->lo, *hi = wall->hi;
         const double corner[12] = {lo[0], lo[1], 0, hi[0], lo[1], 0, hi[0], hi[1], 0, lo[0], hi[1], 0};
+        free(wall->point);
         wall->point = silt_alloc(12, sizeof(double));
         memcpy(wall->point, corner, sizeof corner);
         wall->n_point = 4;

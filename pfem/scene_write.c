@@ -120,12 +120,26 @@ static bool write_counts(const silt_key_table *table, const silt_key *key, const
     }
 }
 
-static void write_file(FILE *to, const char *path, bool folders) {
+/** where the text goes and how files are named in it */
+typedef struct write_state {
+    FILE *to;
+    int dimension;
+    bool folders;            // files with their folder, or their last part only
+    const char *const *name; // or the k-th file as name[k]; NULL: not
+    int n_file, capacity;
+    const char **file; // owned by the caller in the end, the files met so far
+} write_state;
+
+static void write_file(write_state *state, const char *path) {
     const char *slash = strrchr(path, '/');
-    write_text(to, folders || !slash ? path : slash + 1);
+    SILT_RESERVE(state->file, state->capacity, state->n_file + 1);
+    state->file[state->n_file++] = path;
+    write_text(state->to, state->name ? state->name[state->n_file - 1] : state->folders || !slash ? path : slash + 1);
 }
 
-static void write_value(FILE *to, const silt_key *key, const void *base, int dimension, bool folders) {
+static void write_value(write_state *state, const silt_key *key, const void *base) {
+    FILE *to = state->to;
+    const int dimension = state->dimension;
     const void *at = (const char *)base + key->offset;
     int number = 0;
     switch (key->kind) {
@@ -154,11 +168,11 @@ static void write_value(FILE *to, const silt_key *key, const void *base, int dim
         break;
     case KEY_FILE:
     case KEY_SURFACE:
-        write_file(to, *(char *const *)at, folders);
+        write_file(state, *(char *const *)at);
         break;
     case KEY_SERIES:
     case KEY_TABLE:
-        write_file(to, ((const silt_series *)at)->path, folders);
+        write_file(state, ((const silt_series *)at)->path);
         break;
     case KEY_POINT:
         write_numbers(to, dimension, at);
@@ -189,17 +203,17 @@ static void write_value(FILE *to, const silt_key *key, const void *base, int dim
 }
 
 // `dash`: the first row goes behind "- " of a list
-static void write_table(FILE *to, const silt_key_table *table, const void *base, int indent, bool dash, int dimension,
-                        bool folders) {
+static void write_table(write_state *state, const silt_key_table *table, const void *base, int indent, bool dash) {
+    FILE *to = state->to;
     for (const silt_key *key = table->key; key->name; key++) {
-        if (!write_counts(table, key, base, dimension))
+        if (!write_counts(table, key, base, state->dimension))
             continue;
         fprintf(to, "%*s%s%s:", dash ? indent - 2 : indent, "", dash ? "- " : "", key->name);
         dash = false;
         if (key->kind == KEY_BLOCK) {
             fputc('\n', to);
             long before = ftell(to);
-            write_table(to, key->sub, (const char *)base + key->offset, indent + 2, false, dimension, folders);
+            write_table(state, key->sub, (const char *)base + key->offset, indent + 2, false);
             // a block may have nothing to say but that it is there
             if (ftell(to) == before)
                 fprintf(to, "%*s{}\n", indent + 2, "");
@@ -208,22 +222,45 @@ static void write_table(FILE *to, const silt_key_table *table, const void *base,
             int n = *(const int *)((const char *)base + key->count);
             const char *item = *(char *const *)((const char *)base + key->offset);
             for (int i = 0; i < n; i++)
-                write_table(to, key->sub, item + (size_t)i * key->sub->size, indent + 4, true, dimension, folders);
+                write_table(state, key->sub, item + (size_t)i * key->sub->size, indent + 4, true);
         } else {
             fputc(' ', to);
-            write_value(to, key, base, dimension, folders);
+            write_value(state, key, base);
             fputc('\n', to);
         }
     }
 }
 
-char *silt_scene_text(const silt_scene *scene, bool folders) {
+// the whole text; state->file keeps what files are in it
+static char *write_scene(const silt_scene *scene, write_state *state) {
     char *text = NULL;
     size_t size = 0;
-    FILE *to = open_memstream(&text, &size);
-    if (!to)
+    state->to = open_memstream(&text, &size);
+    state->dimension = scene->dimension == 3 ? 3 : 2;
+    if (!state->to)
         return silt_text("%s", "");
-    write_table(to, &silt_scene_keys, scene, 0, false, scene->dimension, folders);
-    fclose(to);
+    write_table(state, &silt_scene_keys, scene, 0, false);
+    fclose(state->to);
+    return text;
+}
+
+char *silt_scene_text(const silt_scene *scene, bool folders) {
+    write_state state = {.folders = folders};
+    char *text = write_scene(scene, &state);
+    free(state.file);
+    return text;
+}
+
+int silt_scene_files(const silt_scene *scene, const char ***file) {
+    write_state state = {.folders = true};
+    free(write_scene(scene, &state));
+    *file = state.file;
+    return state.n_file;
+}
+
+char *silt_scene_text_named(const silt_scene *scene, const char *const *name) {
+    write_state state = {.name = name};
+    char *text = write_scene(scene, &state);
+    free(state.file);
     return text;
 }

@@ -69,24 +69,6 @@ double silt_region_distance(const silt_region *region, int dim, const double *x)
     return sqrt(square) - region->radius;
 }
 
-void silt_region_span(const silt_region *region, int dim, double lo[3], double hi[3]) {
-    for (int d = 0; d < 3; d++) {
-        lo[d] = d < dim && region->kind >= REGION_CIRCLE ? region->centre[d] - region->radius : region->lo[d];
-        hi[d] = d < dim && region->kind >= REGION_CIRCLE ? region->centre[d] + region->radius : region->hi[d];
-    }
-    if (region->kind != REGION_POLYGON)
-        return;
-    for (int c = 0; c < 2; c++) {
-        const int d = c ? dim - 1 : 0;
-        lo[d] = HUGE_VAL;
-        hi[d] = -HUGE_VAL;
-        for (int k = 0; k < region->n_point; k++) {
-            lo[d] = silt_min(lo[d], region->point[3 * k + c]);
-            hi[d] = silt_max(hi[d], region->point[3 * k + c]);
-        }
-    }
-}
-
 void silt_size_create(silt_size **size, const silt_scene *scene, const silt_walls *walls) {
     const silt_fluid_def *fluid = &scene->fluid;
     *size = NULL;
@@ -103,7 +85,7 @@ void silt_size_create(silt_size **size, const silt_scene *scene, const silt_wall
     for (int r = 0; r < fluid->n_size; r++) {
         const silt_size_def *rule = &fluid->size_at[r];
         if (rule->near == NEAR_REGION)
-            silt_region_span(&rule->region, s->dim, s->lo[r], s->hi[r]);
+            silt_region_bounds(&rule->region, s->lo[r], s->hi[r]);
         else { // a fine rule may stand against the coarsest one, a coarse one only against fluid.size
             const double against = rule->size > s->base ? s->base : coarsest;
             s->reach[rule->near] = silt_max(s->reach[rule->near], rule->distance + fabs(against - rule->size) / s->growth);
@@ -176,7 +158,7 @@ static void places_box(const size_places *p, int dim, const double *x, int box[3
         box[d] = d < dim ? (int)silt_clamp(floor((x[d] - p->lo[d]) / p->width), 0, p->box[d] - 1) : 0;
 }
 
-static void places_sort(size_places *p, int dim, double width) {
+static void places_sort(size_places *p, int dim) {
     double hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, room = 1;
     for (int d = 0; d < 3; d++)
         p->lo[d] = HUGE_VAL;
@@ -185,13 +167,15 @@ static void places_sort(size_places *p, int dim, double width) {
             p->lo[d] = silt_min(p->lo[d], p->x[3 * k + d]);
             hi[d] = silt_max(hi[d], p->x[3 * k + d]);
         }
-    // no more boxes than a few per place
-    p->width = width;
-    for (bool fits = false; !fits && p->n; p->width *= fits ? 1 : 1.5) {
+    // about as many boxes as places
+    p->width = 1e-300;
+    for (int d = 0; d < dim && p->n; d++)
+        p->width = silt_max(p->width, (hi[d] - p->lo[d]) / 1000);
+    for (bool fits = false; !fits && p->n; p->width *= fits ? 1 : 1.2) {
         room = 1;
         for (int d = 0; d < dim; d++)
             room *= floor((hi[d] - p->lo[d]) / p->width) + 1;
-        fits = room <= 4.0 * p->n + 64;
+        fits = room <= 2.0 * p->n + 64;
     }
     int n = 1;
     for (int d = 0; d < 3; d++)
@@ -223,42 +207,62 @@ static void places_add(size_places *p, const double *x, int dim) {
     p->n++;
 }
 
-// m, to the nearest place within reach, else HUGE_VAL
+// m2, the nearest place in a box, or best
+static double places_box_square(const size_places *p, int dim, const double *x, int box, double best) {
+    for (int m = p->start[box]; m < p->start[box + 1]; m++) {
+        const double *y = p->x + 3 * p->item[m];
+        double square = silt_square(x[0] - y[0]) + silt_square(x[1] - y[1]);
+        square += dim == 3 ? silt_square(x[2] - y[2]) : 0;
+        best = silt_min(best, square);
+    }
+    return best;
+}
+
+// m, to the nearest place within reach, else HUGE_VAL: shell by shell of boxes around the point's own
 static double places_distance(const silt_size *s, const size_places *p, const double *x, double reach) {
     if (!p->n)
         return HUGE_VAL;
     const double period = s->scene->period[1] - s->scene->period[0];
-    double best = reach * reach;
-    bool found = false;
+    double best = reach * reach * (1 + 1e-12);
+    const double limit = best;
     for (int image = period > 0 ? -1 : 0; image <= (period > 0 ? 1 : 0); image++) {
-        int lo[3], hi[3];
-        double at[3] = {x[0] + image * period, x[1], s->dim == 3 ? x[2] : 0}, a[3], b[3];
-        bool away = false;
+        const double at[3] = {x[0] + image * period, x[1], s->dim == 3 ? x[2] : 0};
+        int own[3];
+        double outside = 0, to_rim = HUGE_VAL; // of the boxes; from the own box's sides
+        for (int d = 0; d < 3; d++)
+            own[d] = d < s->dim ? (int)silt_clamp(floor((at[d] - p->lo[d]) / p->width), -1e6, 1e6) : 0;
+        int first = 0, last = 0;
         for (int d = 0; d < s->dim; d++) {
-            a[d] = at[d] - reach;
-            b[d] = at[d] + reach;
-            away |= b[d] < p->lo[d] || a[d] > p->lo[d] + p->box[d] * p->width;
+            const int away = own[d] < 0 ? -own[d] : own[d] >= p->box[d] ? own[d] - p->box[d] + 1 : 0;
+            const int far = own[d] > p->box[d] - 1 - own[d] ? own[d] : p->box[d] - 1 - own[d];
+            first = away > first ? away : first;
+            last = far > last ? far : last;
+            outside = silt_max(outside, silt_max(p->lo[d] - at[d], at[d] - p->lo[d] - p->box[d] * p->width));
+            const double in = at[d] - p->lo[d] - own[d] * p->width;
+            to_rim = silt_min(to_rim, silt_min(in, p->width - in));
         }
-        if (away)
+        if (outside > 0 && outside * outside > best)
             continue;
-        places_box(p, s->dim, a, lo);
-        places_box(p, s->dim, b, hi);
-        for (int k = lo[2]; k <= hi[2]; k++)
-            for (int j = lo[1]; j <= hi[1]; j++)
-                for (int i = lo[0]; i <= hi[0]; i++) {
-                    const int box = (k * p->box[1] + j) * p->box[0] + i;
-                    for (int m = p->start[box]; m < p->start[box + 1]; m++) {
-                        const double *y = p->x + 3 * p->item[m];
-                        double square = silt_square(at[0] - y[0]) + silt_square(at[1] - y[1]);
-                        square += s->dim == 3 ? silt_square(at[2] - y[2]) : 0;
-                        if (square <= best) {
-                            best = square;
-                            found = true;
-                        }
-                    }
+        for (int shell = first; shell <= last; shell++) {
+            const double nearest = shell ? (shell - 1) * p->width + to_rim : 0;
+            if (nearest > 0 && nearest * nearest > best)
+                break;
+            int lo[3], hi[3];
+            for (int d = 0; d < 3; d++) {
+                lo[d] = d < s->dim && own[d] - shell > 0 ? own[d] - shell : 0;
+                hi[d] = d < s->dim && own[d] + shell < p->box[d] - 1 ? own[d] + shell : p->box[d] - 1;
+            }
+            for (int k = lo[2]; k <= hi[2]; k++)
+                for (int j = lo[1]; j <= hi[1]; j++) {
+                    const bool side = abs(j - own[1]) == shell || (s->dim == 3 && abs(k - own[2]) == shell);
+                    const int row = (k * p->box[1] + j) * p->box[0];
+                    for (int i = lo[0]; i <= hi[0]; i++)
+                        if (side || abs(i - own[0]) == shell)
+                            best = places_box_square(p, s->dim, at, row + i, best);
                 }
+        }
     }
-    return found ? sqrt(best) : HUGE_VAL;
+    return best < limit ? sqrt(best) : HUGE_VAL;
 }
 
 void silt_size_near(silt_size *size, silt_near near, int n, const double *x) {
@@ -266,7 +270,7 @@ void silt_size_near(silt_size *size, silt_near near, int n, const double *x) {
         return;
     for (int k = 0; k < n; k++)
         places_add(&size->places[near], x + size->dim * k, size->dim);
-    places_sort(&size->places[near], size->dim, silt_max(0.5 * size->reach[near], size->base));
+    places_sort(&size->places[near], size->dim);
 }
 
 double silt_size_at(const silt_size *size, const silt_scene *scene, const double *x) {
@@ -370,7 +374,7 @@ void silt_size_update(silt_size *size, silt_nodes *nodes, const silt_mesh *mesh)
         for (int i = 0; i < n; i++)
             if (size->square[k][i] == 0)
                 places_add(p, nodes->x + size->dim * i, size->dim);
-        places_sort(p, size->dim, silt_max(0.5 * size->reach[k], size->base));
+        places_sort(p, size->dim);
     }
     size->updated = true;
     for (int i = 0; i < n; i++) {

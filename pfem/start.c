@@ -75,6 +75,15 @@ void silt_run_box(silt_run *run) {
     }
 }
 
+// closed air of a fresh mesh
+silt_status silt_run_pockets(silt_run *run, silt_error *err) {
+    if (!(run->scene->fluid.air_pressure > 0))
+        return SILT_OK;
+    SILT_TRY(silt_air_find(&run->air, run->scene, &run->nodes, &run->mesh, &run->barrier, err));
+    silt_pockets_update(&run->pockets, run->scene, &run->nodes, &run->mesh, &run->air);
+    return SILT_OK;
+}
+
 silt_status silt_run_first(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     if (scene->bed.on)
@@ -93,6 +102,7 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
         return SILT_OK;
 
     // bodies and bed first: the water keeps its distance
+    run->nodes.dim = scene->dimension;
     for (int b = 0; run->barrier.bodies && b < run->barrier.bodies->count; b++) {
         const struct silt_body *body = &run->barrier.bodies->body[b];
         const double c = 1 - 2 * silt_square(body->q[3]), s = 2 * body->q[0] * body->q[3];
@@ -109,8 +119,14 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
     for (int k = 0; k < run->bed.n_node; k++)
         if (run->bed.exposed[k])
             run->bed.fluid_node[k] = silt_nodes_add(&run->nodes, NODE_BED, k, run->bed.x[k]);
-    silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
+    silt_size_create(&run->size, scene, &run->walls);
+    if (scene->fluid.cloud)
+        SILT_TRY(silt_nodes_read(&run->nodes, scene, &run->walls, run_solid, &run->barrier, err));
+    else
+        silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
     SILT_TRY(silt_mesh_first(&run->mesh, &run->nodes, scene, &run->barrier, err));
+    silt_size_update(run->size, &run->nodes, &run->mesh);
+    SILT_TRY(silt_run_pockets(run, err));
     // nodes of the cloud that got no cell at the start are no drops: they hold no water
     silt_locator_build(&run->locator, &run->mesh, run->nodes.x, scene->fluid.size);
     return SILT_OK;

@@ -47,6 +47,8 @@ silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
         status = silt_store_put(store, "sediment/rest", STORE_BYTE, (size_t)run->n_rest * sizeof *run->rest, run->rest, err);
     if (status == SILT_OK)
         status = silt_gauges_save(run->gauges, store, err);
+    if (status == SILT_OK && run->scene->fluid.air_pressure > 0)
+        status = silt_pockets_save(&run->pockets, store, err);
     if (status == SILT_OK && run->scene->bed.on)
         status = silt_bed_save(&run->bed, store, err);
     if (status == SILT_OK && run->coupling)
@@ -111,11 +113,16 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
         const int64_t revision = run->mesh.revision;
         silt_mesh_connect(&run->mesh, &run->nodes);
         run->mesh.revision = revision;
+        run->mesh.walls = &run->walls;
+        silt_size_create(&run->size, scene, &run->walls);
+        silt_size_update(run->size, &run->nodes, &run->mesh);
         silt_locator_build(&run->locator, &run->mesh, run->nodes.x, scene->fluid.size);
     }
     silt_view view = {.scene = scene, .ledger = &run->ledger, .bed = scene->bed.on ? &run->bed : NULL};
     SILT_TRY(silt_gauges_create(&run->gauges, &view, err));
     SILT_TRY(silt_gauges_load(run->gauges, store, err));
+    if (scene->fluid.air_pressure > 0)
+        SILT_TRY(silt_pockets_restore(&run->pockets, &run->mesh, store, err));
     // porosity of the state that was saved
     if (run->coupling && scene->fluid.on)
         SILT_TRY(silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));

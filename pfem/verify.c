@@ -92,20 +92,30 @@ static const char *plain_name(const char *path) {
     return strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
 }
 
-// the files that a scene reads: the references of its checks, then the series of its inlets; NULL: none there
-static const char *verify_file(const silt_scene *scene, int i) {
-    return i < scene->n_check ? scene->check[i].reference : scene->fluid.inlet[i - scene->n_check].series.path;
+// the copy of the k-th file in OUT: its plain name, or one with a number when that name is taken by another file
+static char *verify_copy_name(const char *const *file, int k) {
+    const char *name = plain_name(file[k]);
+    int first = 0; // where this file comes first
+    while (strcmp(file[first], file[k]) != 0)
+        first++;
+    for (int i = 0; i < first; i++)
+        if (strcmp(name, plain_name(file[i])) == 0)
+            return silt_text("%d_%s", first, name);
+    return silt_text("%s", name);
 }
 
-// the copy of a file in OUT: its plain name, or one with a number when that name is taken
-static char *verify_copy_path(const silt_scene *scene, const char *out, int file) {
-    const char *path = verify_file(scene, file), *name = plain_name(path);
-    for (int i = 0; i < file; i++) {
-        const char *other = verify_file(scene, i);
-        if (other && strcmp(name, plain_name(other)) == 0 && strcmp(path, other) != 0)
-            return silt_text("%s/%d_%s", out, file, name);
-    }
-    return silt_text("%s/%s", out, name);
+// where in OUT the copy of a check's reference is
+static char *verify_copy_path(const silt_scene *scene, const char *out, const char *path) {
+    const char **file = NULL;
+    char *full = NULL;
+    for (int k = 0, n = silt_scene_files(scene, &file); k < n && !full; k++)
+        if (strcmp(file[k], path) == 0) {
+            char *name = verify_copy_name(file, k);
+            full = silt_text("%s/%s", out, name);
+            free(name);
+        }
+    free(file);
+    return full ? full : silt_text("%s/%s", out, plain_name(path));
 }
 
 static void verify_note(silt_check_result *result, const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -124,7 +134,7 @@ static bool verify_read(const silt_scene *scene, const char *out, int check, sil
     int column[3] = {-1, -1, -1};
     silt_series series = {0};
     silt_error err = {0};
-    char *copy = verify_copy_path(scene, out, check);
+    char *copy = verify_copy_path(scene, out, def->reference);
     bool here = access(copy, R_OK) == 0;
     silt_status status = silt_series_read(here ? NULL : scene->folder, here ? copy : def->reference, &series, &err);
     free(copy);
@@ -317,35 +327,19 @@ static silt_status verify_copy_one(const char *base, const char *path, const cha
     return status;
 }
 
-// the resolved scene, where files are the copies: their rows come in the order of the checks and of the inlets
-static silt_status verify_scene(const silt_scene *scene, const char *out, silt_error *err) {
-    static const char *const row[2] = {"reference: ", "series: "};
-    const int end[2] = {scene->n_check, scene->n_check + scene->fluid.n_inlet};
-    int file[2] = {0, scene->n_check};
+// the resolved scene, where files are the copies
+static silt_status verify_scene(const silt_scene *scene, const char *out, const char *const *name, silt_error *err) {
     char *path = silt_text("%s/scene.yaml", out), *aside = silt_text("%s.part", path);
+    char *text = silt_scene_text_named(scene, name);
     silt_status status = SILT_OK;
     FILE *to = fopen(aside, "w");
-    for (const char *line = scene->resolved, *next; to && *line; line = next) {
-        next = strchr(line, '\n') ? strchr(line, '\n') + 1 : line + strlen(line);
-        const char *key = line + strspn(line, " -");
-        int kind = strncmp(key, row[0], strlen(row[0])) == 0 ? 0 : strncmp(key, row[1], strlen(row[1])) == 0 ? 1 : -1;
-        while (kind >= 0 && file[kind] < end[kind] && !verify_file(scene, file[kind]))
-            file[kind]++;
-        if (kind < 0 || file[kind] == end[kind]) {
-            fwrite(line, 1, (size_t)(next - line), to);
-            continue;
-        }
-        char *copy = verify_copy_path(scene, out, file[kind]++);
-        fprintf(to, "%.*s%s\"", (int)(key - line), line, row[kind]);
-        for (const char *c = plain_name(copy); *c; c++)
-            fprintf(to, *c == '"' || *c == '\\' ? "\\%c" : "%c", *c);
-        fputs("\"\n", to);
-        free(copy);
-    }
+    if (to)
+        fputs(text, to);
     if (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0)
         status = silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path, strerror(errno));
     if (to)
         fclose(to);
+    free(text);
     free(aside);
     free(path);
     return status;
@@ -353,14 +347,22 @@ static silt_status verify_scene(const silt_scene *scene, const char *out, silt_e
 
 silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err) {
     silt_status status = SILT_OK;
-    for (int i = 0; i < scene->n_check + scene->fluid.n_inlet && !status; i++) {
-        if (!verify_file(scene, i))
-            continue;
-        char *to = verify_copy_path(scene, out, i);
-        status = verify_copy_one(scene->folder, verify_file(scene, i), to, err);
+    const char **file = NULL;
+    const int n = silt_scene_files(scene, &file);
+    char **name = silt_alloc((size_t)n + 1, sizeof *name);
+    for (int k = 0; k < n && !status; k++) {
+        name[k] = verify_copy_name(file, k);
+        char *to = silt_text("%s/%s", out, name[k]);
+        status = verify_copy_one(scene->folder, file[k], to, err);
         free(to);
     }
-    return status ? status : verify_scene(scene, out, err);
+    if (!status)
+        status = verify_scene(scene, out, (const char *const *)name, err);
+    for (int k = 0; k < n; k++)
+        free(name[k]);
+    free(name);
+    free(file);
+    return status;
 }
 
 static void verify_print(FILE *to, int width, double value) {

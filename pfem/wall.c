@@ -497,10 +497,10 @@ void wall_sliding(const silt_walls *walls, int e, double v[3]) {
 }
 
 void silt_walls_velocity(const silt_walls *walls, const silt_scene *scene, int element, const double *x, double v[3]) {
-    (void)scene;
-    memset(v, 0, 3 * sizeof *v);
-    if (!walls->index)
-        return; // elements made by hand stand still
+    if (!walls->index) { // elements made by hand stand still
+        memcpy(v, scene->wall[walls->wall[element]].velocity, 3 * sizeof *v);
+        return;
+    }
     const int w = walls->wall[element], dim = wall_dim(walls);
     const wall_step *step = &walls->index->step[w];
     const silt_wall_motion *motion = &walls->motion[w];
@@ -635,7 +635,8 @@ static int facet_patch(const silt_walls *walls, const silt_nodes *nodes, int n, 
     return -1;
 }
 
-void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls, const silt_nodes *nodes, const silt_mesh *mesh) {
+void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls, const silt_nodes *nodes, const silt_mesh *mesh,
+                            const double *x) {
     normals->n_row = 0;
     if (!walls->count || !walls->index->any_bent)
         return;
@@ -652,7 +653,7 @@ void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls,
         double side[2][3] = {{0}}, area[3];
         for (int c = 1; c < dim; c++)
             for (int d = 0; d < dim; d++) {
-                side[c - 1][d] = nodes->x[dim * facet[c] + d] - nodes->x[dim * facet[0] + d];
+                side[c - 1][d] = x[dim * facet[c] + d] - x[dim * facet[0] + d];
                 if (mesh->period[d] > 0)
                     side[c - 1][d] -= mesh->period[d] * floor(side[c - 1][d] / mesh->period[d] + 0.5);
             }

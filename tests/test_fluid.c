@@ -218,7 +218,7 @@ static void test_debt_is_paid(void **state) {
     for (int k = 0; k < 60; k++) {
         step(&b, 0.01);
         for (int j = 0; j < 2 * b.nodes.count; j++)
-            b.nodes.x[j] += 0.01 * b.fluid.w[j];
+            b.nodes.x[j] += 0.01 * silt_mesh_velocity(&b.fluid, j);
     }
     for (int i = 0; i < b.nodes.count; i++)
         debt += b.nodes.debt[i];

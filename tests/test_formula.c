@@ -216,7 +216,7 @@ static void test_field_delaunay(void **state) {
     silt_formula_clear(&f);
 }
 
-// a hundred thousand look-ups in a hundred thousand points
+// many look-ups in a hundred thousand points
 static void test_field_time(void **state) {
     (void)state;
     for (int dim = 2; dim <= 3; dim++) {
@@ -226,7 +226,7 @@ static void test_field_time(void **state) {
         const double ready = silt_seconds();
         uint64_t seed = 9;
         double worst = 0;
-        for (int i = 0; i < 100000; i++) {
+        for (int i = 0; i < 20000; i++) {
             double x[3], v[3], w[3];
             for (int k = 0; k < dim; k++)
                 x[k] = 0.05 + 0.9 * silt_uniform(&seed);
@@ -234,7 +234,7 @@ static void test_field_time(void **state) {
             bowl(dim, x, w);
             worst = silt_max(worst, fabs(v[0] - w[0]));
         }
-        print_message("%d-D: prepared in %.2f s, 1e5 look-ups in %.2f s, largest error %.1e\n", dim, ready - start,
+        print_message("%d-D: prepared in %.2f s, 2e4 look-ups in %.2f s, largest error %.1e\n", dim, ready - start,
                       silt_seconds() - ready, worst);
         assert_true(worst < (dim == 2 ? 1e-3 : 0.02));
         free(f.series.name);

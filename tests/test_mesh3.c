@@ -554,7 +554,7 @@ static void test_gap_closes(void **state) {
         for (int trial = 0; trial < 3; trial++) {
             bench b;
             bench_box(&b, dim, 8, 0, false, false, false);
-            const double h = b.scene.fluid.size, gap = trial == 0 ? 0.8 : 0.3;
+            const double h = b.scene.fluid.size, gap = trial == 0 ? 0.8 : 0.45;
             // tear it in the middle, along x
             for (int i = 0; i < b.nodes.count; i++) {
                 double *x = b.nodes.x + dim * i;
@@ -601,11 +601,14 @@ static void test_gap_closes(void **state) {
                     right += b.nodes.x[dim * b.mesh.cell[e][a]] >= 0.5;
                 across += right > 0 && right <= dim;
             }
-            if (trial == 1) {
-                assert_true(across > 8);
-                assert_true(made > 0.5 * gap * h && fabs(made + debts(&b)) < 1e-12);
-            } else
+            print_message("%d-D, gap %.2f h, %s: %.1f %% filled\n", dim, gap, trial == 2 ? "opening" : "closing", 100 * made / (gap * h));
+            assert_true(fabs(made + debts(&b)) < 1e-12);
+            if (trial == 1)
+                assert_true(across > 8 && made > 0.9 * gap * h);
+            else if (dim == 2)
                 assert_int_equal(across, 0);
+            else // a few cells of the triangulation cut through the surface
+                assert_true(made < 0.05 * gap * h);
             check_topology(&b);
             bench_close(&b);
         }
@@ -654,31 +657,33 @@ static void totals(const bench *b, double momentum[3], double *energy) {
         }
 }
 
-static void momentum_trial(int dim, unsigned walled, bool violent) {
+enum { FIELD_LINEAR, FIELD_WAVE, FIELD_VIOLENT };
+
+static void momentum_trial(int dim, unsigned walled, int field) {
+    static const char *const name[3] = {"linear", "wave", "violent"};
     bench b;
     bench_box(&b, dim, dim == 2 ? 16 : 8, walled, false, false, false);
     b.memory.record = true;
-    double plain = 0, worst = 0, smear = 0, all_lost[3] = {0};
+    double plain = 0, all_plain = 0, worst = 0, moved = 0, lost_sum[3] = {0}, energy[2] = {0};
     for (int step = 0; step < 40; step++) {
         for (int i = 0; i < b.nodes.count; i++)
-            b.nodes.debt[i] *= b.mesh.wet[i] ? 0.8 : 1; // paid back
-        if (violent)
+            b.nodes.debt[i] *= b.mesh.wet[i] ? 0.5 : 1; // paid back
+        if (field == FIELD_VIOLENT)
             stir(&b, step);
-        else {
+        else
             wander(&b, step, 0.08);
-            for (int i = 0; i < b.nodes.count; i++)
-                for (int d = 0; d < dim; d++) {
-                    // linear, and tangential on the walls
-                    const double *x = b.nodes.x + dim * i;
-                    b.nodes.v[dim * i + d] = (x[d] == 0 || x[d] == 1) && walled ? 0 : 1 + x[(d + 1) % dim] - 2 * x[d];
-                }
-        }
+        for (int i = 0; i < b.nodes.count && field != FIELD_VIOLENT; i++)
+            for (int d = 0; d < dim; d++) {
+                const double *x = b.nodes.x + dim * i, y = x[(d + 1) % dim];
+                // along the walls where there are any
+                const double wave = sin(M_PI * x[d]) * (1 + cos(2 * M_PI * y) + 0.3 * sin(9 * y + step));
+                b.nodes.v[dim * i + d] = field == FIELD_LINEAR ? 1 + y - 2 * x[d] : x[d] == 0 || x[d] == 1 ? 0 : wave;
+            }
         silt_memory_take(&b.memory, &b.mesh, &b.nodes);
         const int n = b.nodes.count;
         silt_memory_extend(&b.memory, n);
-        if (violent)
-            for (int i = 0; i < n; i++)
-                b.memory.dead[i] = noise(b.nodes.id[i], step, 6) > 0.995;
+        for (int i = 0; i < n; i++)
+            b.memory.dead[i] = field == FIELD_VIOLENT && noise(b.nodes.id[i], step, 6) > 0.995;
         double *v = silt_alloc((size_t)(dim * n), sizeof *v), *debt = silt_alloc((size_t)n, sizeof *debt);
         memcpy(v, b.nodes.v, (size_t)(dim * n) * sizeof *v);
         memcpy(debt, b.nodes.debt, (size_t)n * sizeof *debt);
@@ -694,46 +699,52 @@ static void momentum_trial(int dim, unsigned walled, bool violent) {
         }
         rebuild(&b);
         totals(&b, after, &e1);
-        for (int d = 0; d < dim; d++)
+        for (int d = 0; d < dim; d++) {
             plain = silt_max(plain, fabs(after[d] - before[d]));
+            all_plain += fabs(after[d] - before[d]);
+        }
         silt_momentum_hand_on(&b.memory, &b.mesh, &b.nodes, 1, NULL, debt, v, b.map, lost);
         totals(&b, after, &e2);
+        energy[0] += (e1 - e0) / e0;
+        energy[1] += (e2 - e0) / e0;
         for (int d = 0; d < dim; d++) {
             worst = silt_max(worst, fabs(after[d] + lost[d] - before[d]));
-            all_lost[d] += lost[d];
+            lost_sum[d] += fabs(lost[d]);
         }
-        if (violent && e2 > e0 * (1 + 1e-12))
-            fail_msg("%d-D, step %d: energy %.17g, before %.17g", dim, step, e2, e0);
         for (int i = 0; i < n; i++)
             for (int d = 0; d < dim && b.map[i] >= 0; d++) {
                 const double now = b.nodes.v[dim * b.map[i] + d];
                 assert_true(now > lo[d] - 1e-12 && now < hi[d] + 1e-12);
-                if (!violent)
-                    smear = silt_max(smear, fabs(now - v[dim * i + d]));
-                if (b.nodes.wall[b.map[i]][0] >= 0) // slips along: nothing through the wall
-                    for (int k = 0; k < 3; k++)
-                        if (b.nodes.wall[b.map[i]][k] >= 0 && b.nodes.wall[b.map[i]][k] / 2 == d)
-                            assert_true(fabs(now - v[dim * i + d]) < 1e-13);
+                moved = silt_max(moved, fabs(now - v[dim * i + d]));
+                // slips along: nothing through the wall
+                for (int k = 0; k < 3; k++)
+                    if (b.nodes.wall[b.map[i]][k] >= 0 && b.nodes.wall[b.map[i]][k] / 2 == d)
+                        assert_true(fabs(now - v[dim * i + d]) < 1e-13);
             }
         free(v);
         free(debt);
     }
-    print_message("%d-D%s%s: momentum off by %.2g (%.2g without), %.2g %.2g %.2g lost to walls, a linear field by %.2g\n", dim,
-                  walled ? ", walls" : "", violent ? ", violent" : "", worst, plain, all_lost[0], all_lost[1], all_lost[2], smear);
+    print_message("%d-D, %s%s: momentum off by at most %.2g (%.2g without); not placed %.2g of %.2g; velocities moved by %.2g;"
+                  " energy %+.2g (%+.2g without)\n", dim, name[field], walled ? ", walls" : "", worst, plain,
+                  lost_sum[0] + lost_sum[1] + lost_sum[2], all_plain, moved, energy[1], energy[0]);
     assert_true(worst < 1e-14);
-    assert_true(plain > 1e-6); // the test is not empty
-    if (!walled)
-        for (int d = 0; d < 3; d++)
-            assert_true(fabs(all_lost[d]) < 1e-14);
+    if (field == FIELD_LINEAR)
+        assert_true(plain < 1e-14 && moved < 1e-12);
+    else
+        assert_true(plain > 1e-6); // the test is not empty
+    // a group may be held by walls altogether; in violent motion nodes owe more than they have now and then
+    for (int d = 0; d < 3; d++)
+        assert_true(lost_sum[d] <= (field == FIELD_VIOLENT || (walled && dim == 3) ? 0.1 * all_plain : 1e-12));
     bench_close(&b);
 }
 
 static void test_momentum_is_handed_on(void **state) {
     (void)state;
     for (int dim = 2; dim <= 3; dim++) {
-        momentum_trial(dim, 0, true);
-        momentum_trial(dim, 0, false);
-        momentum_trial(dim, 0x3f, false);
+        momentum_trial(dim, 0x3f, FIELD_LINEAR);
+        momentum_trial(dim, 0, FIELD_WAVE);
+        momentum_trial(dim, 0x3f, FIELD_WAVE);
+        momentum_trial(dim, 0, FIELD_VIOLENT);
     }
 }
 

@@ -1,4 +1,4 @@
-// what silt info says about the model that a scene uses, and what it warns about
+// what silt info says about the model that a scene uses, what it warns about, which files it takes along
 #include "output.h"
 
 #include <setjmp.h>
@@ -87,7 +87,45 @@ static void test_warn(void **state) {
           "periodic for the water alone");
 }
 
+// an output folder holds all that its scene reads, each file once
+static void test_copies(void **state) {
+    (void)state;
+    static const char *const name[] = {"water.yaml", "space.yaml", "whole.yaml"};
+    static const int files[] = {7, 3, 2}, copies[] = {6, 3, 2};
+    for (int i = 0; i < 3; i++) {
+        char path[4096], out[] = SILT_BINARY "/test_model_XXXXXX", command[4096];
+        silt_error err = {0};
+        silt_scene *scene = NULL, *again = NULL;
+        const char **file = NULL;
+        assert_non_null(mkdtemp(out));
+        snprintf(path, sizeof path, RIGHT "%s", name[i]);
+        assert_int_equal(silt_scene_read(path, 0, NULL, &scene, &err), SILT_OK);
+        assert_int_equal(silt_verify_copy(scene, out, &err), SILT_OK);
+        snprintf(path, sizeof path, "%s/scene.yaml", out);
+        if (silt_scene_read(path, 0, NULL, &again, &err))
+            fail_msg("%s", err.text);
+        assert_true(again->hash == scene->hash);
+        const int n = silt_scene_files(again, &file);
+        assert_int_equal(n, files[i]);
+        int different = 0;
+        for (int k = 0; k < n; k++) {
+            bool known = false;
+            for (int m = 0; m < k; m++)
+                known |= strcmp(file[m], file[k]) == 0;
+            different += !known;
+            assert_true(strncmp(file[k], out, strlen(out)) == 0);
+        }
+        assert_int_equal(different, copies[i]);
+        free(file);
+        silt_scene_free(&scene);
+        silt_scene_free(&again);
+        snprintf(command, sizeof command, "rm -rf '%s'", out);
+        assert_int_equal(system(command), 0);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_info), cmocka_unit_test(test_warn)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_info), cmocka_unit_test(test_warn),
+                                       cmocka_unit_test(test_copies)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
