@@ -41,5 +41,12 @@ static inline double silt_min(double a, double b) { return a < b ? a : b; }
 static inline double silt_max(double a, double b) { return a > b ? a : b; }
 static inline double silt_clamp(double x, double lo, double hi) { return silt_min(silt_max(x, lo), hi); }
 static inline double silt_square(double x) { return x * x; }
+static inline double silt_dot(int dim, const double *a, const double *b) {
+    double sum = 0;
+    for (int d = 0; d < dim; d++)
+        sum += a[d] * b[d];
+    return sum;
+}
+static inline double silt_length(int dim, const double *a) { return sqrt(silt_dot(dim, a, a)); }
 
 #endif

@@ -1,43 +1,72 @@
 /** @file fluid.h
- * One step of the water: momentum, pressure, correction on the midpoint mesh (docs/method.md, "Fluid").
+ * One step of the water: momentum, pressure, correction on the midpoint mesh (docs/method.md, "Fluid"), in 2-D and 3-D.
+ * Rooms: fluid.c the step, hold.c what surroundings hold, assemble.c integrals over cells, momentum.c the viscous system,
+ * pressure.c the pressure system, debt.c volume that is owed and water that cannot keep its volume.
  */
 #ifndef SILT_FLUID_H
 #define SILT_FLUID_H
 
-#include "pfem.h"
+#include "pocket.h"
+#include "viscosity.h"
 
 typedef struct silt_pressure silt_pressure; // the pressure matrix and its factor, pressure.c
+typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
+
+/** what a step sees */
+typedef struct silt_step {
+    const silt_scene *scene;
+    const silt_walls *walls;
+    const silt_mesh *mesh;
+    const silt_drag *drag;       // NULL without grains in the water
+    silt_pockets *pockets;       // NULL where air has no pressure
+    silt_nodes *nodes;
+    double time, dt;             // s, start and length
+} silt_step;
 
 /** working space and results of a step; arrays grow only */
 typedef struct silt_fluid {
-    int n_node, n_cell, node_capacity, cell_capacity;
-    double *x_mid;        // owned, 2 per node, positions of the midpoint mesh
-    double *area;         // owned, per cell, at the midpoint
-    double (*grad)[3][2]; // owned, per cell, gradients of the shape functions
-    double (*share)[3];   // owned, per cell, int of solid share times N_i over the area
+    int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity;
+    double *x_mid;        // owned, dim per node, positions of the midpoint mesh
+    double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
+    double *cell_volume;  // owned, per cell, at the midpoint
+    double *inverse;      // owned, per cell, 1/volume, bounded in slivers: gradients are flux times this
+    double *mu;           // owned, per cell, Pa s, effective viscosity
+    double *tau;          // owned, per cell, stabilisation
+    double *share;        // owned, dim + 1 per cell, int of solid share times N_i over the volume; NULL without grains
+    double *wall_force;   // owned, dim per node, N, explicit part of the law of the wall's traction; NULL without such walls
+    double *shift;        // owned, dim per node, m/s: carries positions, not momentum, to where debts are paid; NULL without volume control
+    double *belt;         // owned, dim per node, velocity of a wall's surface along itself; NULL without such walls
     double *mass;         // owned, per node, lumped mass of water, kg
     double *volume;       // owned, per node, lumped volume of the cells
-    double *friction;     // owned, per node, kg/s, wall law: traction over speed, times the wall's length
+    double *friction;     // owned, per node, kg/s, wall law: traction over speed, times the wall's measure
     double *inertia;      // owned, per node, mass / (theta dt) + drag coefficient + friction
-    double *w;            // owned, 2 per node, the step's velocity: positions move with it
-    double *star, *force, *reaction, *scratch; // owned, 2 per node; reaction: force of walls, bed, bodies on the water, N
-    double *projection, *projection_weight;    // owned, pressure gradient projection (2 per node) and its weight
+    double *w;            // owned, dim per node, the step's velocity: positions move with it
+    double *star, *force, *reaction, *scratch; // owned, dim per node; reaction: force of walls, bed, bodies on the water, N
+    double *excess;       // owned, dim per node, N, force that turns the lumped mass towards the consistent one
+    double *projection, *projection_weight;    // owned, pressure gradient projection (dim per node) and its weight
     double *residual, *rate, *increment;       // owned, 1 per node
-    uint8_t *hold;        // owned, 0 free, 1 normal velocity held, 2 both held
+    uint8_t *hold;        // owned, silt_hold
     uint8_t *mobile;      // owned, 1: some neighbour or the node itself can move; 2: but not so that its volume is kept
     double *withheld;     // owned, per node, m3/s: gain that continuity does not see where mobile is not 1
-    double *normal;       // owned, 2 per node, where hold is 1
-    double *cg[3];        // owned, 2 per node, momentum solver
-    double (*tau);        // owned, per cell, stabilisation
+    double *normal;       // owned, dim per node: silt_walls_hold's vector
+    double *given;        // owned, dim per node, velocity of what is held
+    silt_wall_normals wall_normals; // owned, of nodes on bent walls
+    double *cg[3];        // owned, dim per node, momentum solver
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned
+    silt_mix *mix;        // owned
+    silt_depth depth;     // owned, distances to walls and surface; empty where viscosity is the same everywhere
+    silt_wall_law law;    // owned
+    silt_viscosity_report viscosity; // of the last step
 
     // of the last step
-    int iterations, momentum_iterations;
+    int iterations, momentum_iterations, pressure_iterations;
     double worst;             // largest |residual| dt / volume
-    double from_grains[2];    // N, force of the grains on the water
+    double from_grains[3];    // N, force of the grains on the water
     double dissipated;        // J, viscous
-    double worked;            // J, of bodies, inlets and grains on the water
+    double worked;            // J, of bodies, inlets, walls and grains on the water
+    double projected;         // J, kinetic energy that making the first velocity free of divergence took
+    double impulse[3];        // N s, what that gave to the water (of walls, bed, bodies)
     double solved_volume;     // m3, sum of residual times dt
     double given_back;        // m3, volume that the debts asked for
     double momentum_residual; // N, unbalanced force on free nodes
@@ -46,22 +75,82 @@ typedef struct silt_fluid {
 } silt_fluid;
 
 void silt_fluid_clear(silt_fluid *fluid);
-/** Solves a step of dt from the nodes' x, v, p. On success nodes->v and nodes->p are new, fluid->w holds the velocity that
+/** Solves a step from the nodes' x, v, p. On success nodes->v and nodes->p are new, fluid->w holds the velocity that
  * positions move with, debts are paid by what was asked; positions are untouched. On failure the nodes are as before.
- * @param drag  NULL without grains in the water
  * Errors: SILT_FAILED with what did not converge and where. */
-silt_status silt_fluid_step(silt_fluid *fluid, const silt_scene *scene, const silt_walls *walls, silt_nodes *nodes,
-                            const silt_mesh *mesh, const silt_drag *drag, double dt, silt_error *err);
+silt_status silt_fluid_step(silt_fluid *fluid, const silt_step *step, silt_error *err);
+/** component k of the velocity that the mesh moves with: w, the debts' shift, less a belt's own motion */
+static inline double silt_mesh_velocity(const silt_fluid *f, int k) {
+    return f->w[k] + (f->shift ? f->shift[k] : 0) - (f->belt ? f->belt[k] : 0);
+}
+
+// hold.c -------------------------------------------------------------------------------------------------
+/** which velocity components the surroundings hold, and at what velocity */
+void silt_hold_nodes(silt_fluid *fluid, const silt_step *step);
+/** Renews what holds nodes on bent walls, from the facets of the present midpoint mesh: with any other normals a full tank cannot
+ * keep its volume. */
+void silt_hold_bent(silt_fluid *fluid, const silt_step *step);
+/** silt_hold_impose; on bent walls the velocity keeps its size: turning does no work */
+void silt_hold_turn(const silt_fluid *fluid, int i, double *v);
+/** takes the held components out of a vector of dim numbers */
+void silt_hold_project(const silt_fluid *fluid, int i, double *v);
+/** v with its held components replaced by the given ones */
+void silt_hold_impose(const silt_fluid *fluid, int i, double *v);
+
+// assemble.c ---------------------------------------------------------------------------------------------
+/** geometry, masses and stabilisation on the mesh half way along dt w; dt = 0: where the nodes are */
+void silt_assemble_geometry(silt_fluid *fluid, const silt_step *step, double dt);
+/** out += G p; adds to lost (may be NULL) what acts on the grains */
+void silt_assemble_pressure(const silt_fluid *fluid, const silt_mesh *mesh, const double *p, double *out, double *lost);
+/** out += factor K v: viscous force, deviatoric */
+void silt_assemble_viscous(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, double factor, double *out);
+/** diagonal += diagonal of K, its mean over the components */
+void silt_assemble_viscous_diagonal(const silt_fluid *fluid, const silt_mesh *mesh, double *diagonal);
+/** out += (lumped - consistent mass) a */
+void silt_assemble_mass_excess(const silt_fluid *fluid, const silt_mesh *mesh, double density, const double *a, double *out);
+/** residual of continuity: G^T v + L p + Q pi - source - rate (NULL: 0); where no velocity can mend it, of its smoothing alone */
+void silt_assemble_continuity(silt_fluid *fluid, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
+                              const double *p);
+/** pi = -M^-1 Q^T p: the recovered pressure gradient, lumped */
+void silt_assemble_projection(silt_fluid *fluid, const silt_mesh *mesh, const double *p);
+/** out = G^T v + L p, without sources and projection (the pressure system applied) */
+void silt_assemble_divergence(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, const double *p, double *out);
+
+// momentum.c ---------------------------------------------------------------------------------------------
+/** (inertia + K) v = right on the free components; v holds the first guess with held components in place */
+silt_status silt_momentum_solve(silt_fluid *fluid, const silt_step *step, const double *right, double *v, silt_error *err);
+
+// debt.c -------------------------------------------------------------------------------------------------
+/** debts spread a little among neighbours, then ask for their volume back: fluid->rate */
+void silt_debts_ask(silt_fluid *fluid, const silt_step *step);
+/** where water is hemmed in, a debt cannot be paid: it waits. @return whether any was let off */
+bool silt_debts_relent(silt_fluid *fluid);
+/** a node whose whole surroundings are held has no say in its volume, nor have films and crumbs with a free node or two */
+void silt_mobile_find(silt_fluid *fluid, const silt_mesh *mesh, double *p);
+/** which nodes may be let off: between held ones; also where little is missing; all */
+typedef enum { POCKET_HELD = 0, POCKET_LITTLE, POCKET_ANY } silt_pocket;
+/** nodes that no velocity keeps at their volume take the pressure around them. @return whether there was any */
+bool silt_pockets_relent(silt_fluid *fluid, const silt_mesh *mesh, silt_pocket which, double limit, double dt, double *p);
+
+// accelerate.c -------------------------------------------------------------------------------------------
+void silt_mix_restart(silt_mix **mix); // makes it at first
+void silt_mix_free(silt_mix **mix);
+/** Mixes the corrected pressure and velocity (n and dim n numbers) with those of earlier iterates of the step.
+ * @param change    n pressure corrections of this iterate, @param residual  n, what asked for them, change . residual > 0 */
+void silt_mix_next(silt_mix *mix, int dim, int n, const double *change, const double *residual, double *pressure, double *velocity);
 
 // pressure.c ------------------------------------------------------------------------------------------
 silt_pressure *silt_pressure_create(void);
 void silt_pressure_free(silt_pressure **pressure);
-/** Assembles and factors  sum_i G_i^T P_i G_i / inertia_i + L  (consistent) or its Laplacian counterpart.
- * Errors: SILT_FAILED when the matrix is not positive definite. */
-silt_status silt_pressure_factor(silt_pressure *pressure, const silt_scene *scene, const silt_fluid *fluid,
-                                 const silt_nodes *nodes, const silt_mesh *mesh, silt_error *err);
-/** increment = matrix^-1 right */
-silt_status silt_pressure_solve(silt_pressure *pressure, const double *right, double *increment, silt_error *err);
+/** Assembles and factors  sum_i G_i^T P_i G_i / inertia_i + L  (consistent) or its Laplacian counterpart; where that is too
+ * dear (3-D) a compact matrix like it, which then preconditions conjugate gradients.
+ * stiff: the viscous counterpart is wanted too. Errors: SILT_FAILED when the matrix is not positive definite. */
+silt_status silt_pressure_factor(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, bool stiff, silt_error *err);
+/** increment = matrix^-1 right; iterations stop at `tolerance` relative to the right side */
+silt_status silt_pressure_solve(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, const double *right,
+                                double tolerance, double *increment, silt_error *err);
+/** increment = (3/(4 mu) M + L)^-1 right: the pressure's operator where viscosity outweighs inertia */
+silt_status silt_pressure_solve_stiff(silt_pressure *pressure, const double *right, double *increment, silt_error *err);
 /** forgets factors, so that a resumed run and one that went on hold the same */
 void silt_pressure_forget(silt_pressure *pressure);
 

@@ -1,4 +1,4 @@
-// frames: fluid, bed, grains and bodies as VTKHDF files, their .series indices, run.h5 and run.log
+// frames: fluid, its surface in 3-D, bed, grains and bodies as VTKHDF files, their .series indices, run.h5 and run.log
 
 #include "image.h"
 #include "output.h"
@@ -7,10 +7,10 @@
 #include <unistd.h>
 
 // cell types of VTK
-enum { VTK_VERTEX = 1, VTK_TRIANGLE = 5, VTK_POLYGON = 7 };
+enum { VTK_VERTEX = 1, VTK_TRIANGLE = 5, VTK_POLYGON = 7, VTK_TETRA = 10 };
 
-static const char *const frame_part[] = {"fluid", "bed", "grains", "bodies"};
-enum { FRAME_FLUID, FRAME_BED, FRAME_GRAINS, FRAME_BODIES, FRAME_PARTS };
+static const char *const frame_part[] = {"fluid", "surface", "bed", "grains", "bodies"};
+enum { FRAME_FLUID, FRAME_SURFACE, FRAME_BED, FRAME_GRAINS, FRAME_BODIES, FRAME_PARTS };
 
 // ---------------------------------------------------------------- one VTKHDF file
 
@@ -99,14 +99,71 @@ static silt_status frame_close(frame_file *f, silt_error *err) {
     return status;
 }
 
-// two components become three
-static double *frame_vectors(int n, const double *v) {
-    double *wide = silt_alloc(3 * (size_t)n + 1, sizeof *wide);
-    for (int i = 0; i < n; i++) {
-        wide[3 * i] = v[2 * i];
-        wide[3 * i + 1] = v[2 * i + 1];
+// ---------------------------------------------------------------- points of the water
+
+/** The nodes as points of a file. Cells that join nodes across a periodic border get copies of the far ones beside the
+ * near ones: nothing is stretched over the domain. */
+typedef struct frame_cloud {
+    const silt_view *view;
+    int n, node_capacity, x_capacity;
+    int *node;  // owned, the node that each point shows
+    double *x;  // owned, 3 per point, m
+    int *place; // owned, 3 per node: its point one period back, at home, one period on; -1: none
+} frame_cloud;
+
+static int frame_cloud_add(frame_cloud *c, int node, int turn) {
+    const int dim = silt_nodes_dim(c->view->nodes), place = 3 * node + 1 + turn;
+    if (c->place[place] >= 0)
+        return c->place[place];
+    SILT_RESERVE(c->node, c->node_capacity, c->n + 1);
+    SILT_RESERVE(c->x, c->x_capacity, 3 * (c->n + 1));
+    for (int d = 0; d < 3; d++)
+        c->x[3 * c->n + d] = d < dim ? c->view->nodes->x[dim * node + d] : 0;
+    c->x[3 * c->n] += turn * c->view->mesh->period[0];
+    c->node[c->n] = node;
+    return c->place[place] = c->n++;
+}
+
+static void frame_cloud_make(frame_cloud *c, const silt_view *view) {
+    *c = (frame_cloud){.view = view};
+    c->place = silt_alloc(3 * (size_t)view->nodes->count + 1, sizeof *c->place);
+    for (int i = 0; i < 3 * view->nodes->count; i++)
+        c->place[i] = -1;
+}
+
+static void frame_cloud_clear(frame_cloud *c) {
+    free(c->node);
+    free(c->x);
+    free(c->place);
+}
+
+// points of a cell or facet of n nodes; across the border it lies where its middle is between the domain's ends
+static void frame_cloud_cell(frame_cloud *c, int n, const int *node, int64_t *link) {
+    const silt_mesh *mesh = c->view->mesh;
+    const int dim = silt_nodes_dim(c->view->nodes);
+    const double period = mesh->period[0], *x = c->view->nodes->x;
+    double corner[12], middle = 0;
+    const int cell[4] = {node[0], node[1], n > 2 ? node[2] : node[0], n > 3 ? node[3] : node[0]};
+    if (period > 0)
+        silt_cell_corners(mesh, x, cell, corner);
+    for (int k = 0; k < n && period > 0; k++)
+        middle += corner[dim * k] / n;
+    const double home = period > 0 ? period * floor((middle - c->view->scene->period[0]) / period) : 0;
+    for (int k = 0; k < n; k++) {
+        const int turn = period > 0 ? (int)lround((corner[dim * k] - home - x[dim * node[k]]) / period) : 0;
+        link[k] = frame_cloud_add(c, node[k], turn < -1 ? -1 : turn > 1 ? 1 : turn);
     }
-    return wide;
+}
+
+// the nodes' values at the points: `width` of a node's numbers, in a row of three when there are several
+static void frame_field(frame_file *f, const frame_cloud *c, const char *name, int width, const double *value) {
+    const int row = width > 1 ? 3 : 1;
+    double *wide = silt_alloc((size_t)row * (size_t)c->n + 1, sizeof *wide);
+    for (int i = 0; i < c->n; i++)
+        for (int d = 0; d < width; d++)
+            wide[row * i + d] = value[width * c->node[i] + d];
+    frame_put(f, f->point, name, H5T_NATIVE_DOUBLE, (size_t)c->n, row > 1 ? row : 0, wide);
+    free(wide);
 }
 
 // ---------------------------------------------------------------- the parts
@@ -114,20 +171,24 @@ static double *frame_vectors(int n, const double *v) {
 static silt_status frame_fluid(const char *out, int number, const silt_view *view, silt_error *err) {
     const silt_nodes *nodes = view->nodes;
     const silt_mesh *mesh = view->mesh;
+    const int dim = silt_nodes_dim(nodes);
     size_t n = (size_t)nodes->count, cells = (size_t)mesh->n_cell;
-    int64_t *link = silt_alloc(3 * cells + n + 1, sizeof *link), *offset = silt_alloc(cells + n + 1, sizeof *offset);
+    int64_t *link = silt_alloc((size_t)(dim + 1) * cells + n + 1, sizeof *link);
+    int64_t *offset = silt_alloc(cells + n + 1, sizeof *offset);
     uint8_t *type = silt_alloc(cells + n + 1, 1);
-    double *x = frame_vectors(nodes->count, nodes->x), *v = frame_vectors(nodes->count, nodes->v);
-    double *porosity = silt_alloc(n + 1, sizeof *porosity);
 
-    // the triangles, then every node without a triangle as a vertex
+    // all nodes first; the cells, then every node without a cell as a vertex
+    frame_cloud c;
+    frame_cloud_make(&c, view);
+    for (int i = 0; i < nodes->count; i++)
+        frame_cloud_add(&c, i, 0);
     int n_cell = 0;
     int64_t used = 0;
     for (; n_cell < mesh->n_cell; n_cell++) {
-        for (int k = 0; k < 3; k++)
-            link[used++] = mesh->cell[n_cell][k];
+        frame_cloud_cell(&c, dim + 1, mesh->cell[n_cell], link + used);
+        used += dim + 1;
         offset[n_cell + 1] = used;
-        type[n_cell] = VTK_TRIANGLE;
+        type[n_cell] = dim == 3 ? VTK_TETRA : VTK_TRIANGLE;
     }
     for (int i = 0; i < nodes->count; i++) {
         if (i < mesh->n_node && mesh->wet[i])
@@ -139,22 +200,56 @@ static silt_status frame_fluid(const char *out, int number, const silt_view *vie
 
     frame_file f;
     frame_open(&f, out, frame_part[FRAME_FLUID], number, view);
-    frame_grid(&f, nodes->count, x, n_cell, offset, link, type);
-    frame_put(&f, f.point, "velocity", H5T_NATIVE_DOUBLE, n, 3, v);
-    frame_put(&f, f.point, "pressure", H5T_NATIVE_DOUBLE, n, 0, nodes->p);
+    frame_grid(&f, c.n, c.x, n_cell, offset, link, type);
+    frame_field(&f, &c, "velocity", dim, nodes->v);
+    frame_field(&f, &c, "pressure", 1, nodes->p);
+    double *porosity = silt_alloc(n + 1, sizeof *porosity);
+    int64_t *id = silt_alloc((size_t)c.n + 1, sizeof *id);
+    uint8_t *kind = silt_alloc((size_t)c.n + 1, 1);
     if (view->scene->grains.on || view->solid) {
         for (size_t i = 0; i < n; i++)
             porosity[i] = view->solid ? 1 - view->solid[i] : 1;
-        frame_put(&f, f.point, "porosity", H5T_NATIVE_DOUBLE, n, 0, porosity);
+        frame_field(&f, &c, "porosity", 1, porosity);
     }
-    frame_put(&f, f.point, "id", H5T_NATIVE_INT64, n, 0, nodes->id);
-    frame_put(&f, f.point, "kind", H5T_NATIVE_UINT8, n, 0, nodes->kind);
+    for (int i = 0; i < c.n; i++) {
+        id[i] = nodes->id[c.node[i]];
+        kind[i] = nodes->kind[c.node[i]];
+    }
+    frame_put(&f, f.point, "id", H5T_NATIVE_INT64, (size_t)c.n, 0, id);
+    frame_put(&f, f.point, "kind", H5T_NATIVE_UINT8, (size_t)c.n, 0, kind);
     free(link);
     free(offset);
     free(type);
-    free(x);
-    free(v);
     free(porosity);
+    free(id);
+    free(kind);
+    frame_cloud_clear(&c);
+    return frame_close(&f, err);
+}
+
+// 3-D: the water's boundary as triangles
+static silt_status frame_surface(const char *out, int number, const silt_view *view, silt_error *err) {
+    const silt_mesh *mesh = view->mesh;
+    size_t facets = (size_t)mesh->n_facet;
+    int64_t *link = silt_alloc(3 * facets + 1, sizeof *link), *offset = silt_alloc(facets + 1, sizeof *offset);
+    uint8_t *type = silt_alloc(facets + 1, 1);
+    frame_cloud c;
+    frame_cloud_make(&c, view);
+    for (int i = 0; i < mesh->n_facet; i++) {
+        frame_cloud_cell(&c, 3, mesh->facet[i], link + 3 * i);
+        offset[i + 1] = 3 * (i + 1);
+        type[i] = VTK_TRIANGLE;
+    }
+    frame_file f;
+    frame_open(&f, out, frame_part[FRAME_SURFACE], number, view);
+    frame_grid(&f, c.n, c.x, mesh->n_facet, offset, link, type);
+    frame_field(&f, &c, "velocity", 3, view->nodes->v);
+    frame_field(&f, &c, "pressure", 1, view->nodes->p);
+    frame_put(&f, f.cell, "kind", H5T_NATIVE_UINT8, facets, 0, mesh->facet_kind);
+    free(link);
+    free(offset);
+    free(type);
+    frame_cloud_clear(&c);
     return frame_close(&f, err);
 }
 
@@ -361,10 +456,10 @@ static silt_status frame_links(const frame_list *list, const bool has[FRAME_PART
 static uint64_t frame_hash(const silt_view *view) {
     uint64_t hash = silt_hash(0, &view->step, sizeof view->step);
     if (view->nodes && view->nodes->count) {
-        size_t size = 2 * (size_t)view->nodes->count * sizeof(double);
+        size_t one = (size_t)view->nodes->count * sizeof(double), size = (size_t)silt_nodes_dim(view->nodes) * one;
         hash = silt_hash(hash, view->nodes->x, size);
         hash = silt_hash(hash, view->nodes->v, size);
-        hash = silt_hash(hash, view->nodes->p, size / 2);
+        hash = silt_hash(hash, view->nodes->p, one);
     }
     if (view->grains && view->grains->count) {
         size_t size = 3 * (size_t)view->grains->count * sizeof(double);
@@ -400,9 +495,10 @@ static silt_status frame_log(const char *out, int number, const silt_view *view,
 typedef silt_status frame_writer(const char *out, int number, const silt_view *view, silt_error *err);
 
 silt_status silt_frame_write(const char *out, int number, const silt_view *view, silt_error *err) {
-    static frame_writer *const write[FRAME_PARTS] = {frame_fluid, frame_bed, frame_grains, frame_bodies};
-    const bool has[FRAME_PARTS] = {view->nodes && view->mesh, view->bed && view->scene->bed.on, view->scene->grains.on,
-                                   view->bodies && view->bodies->count > 0};
+    static frame_writer *const write[FRAME_PARTS] = {frame_fluid, frame_surface, frame_bed, frame_grains, frame_bodies};
+    const bool water = view->nodes && view->mesh;
+    const bool has[FRAME_PARTS] = {water, water && silt_nodes_dim(view->nodes) == 3, view->bed && view->scene->bed.on,
+                                   view->scene->grains.on, view->bodies && view->bodies->count > 0};
     frame_list list = {0};
     silt_status status = SILT_OK;
     // a file first, then its index: what an index names is always whole

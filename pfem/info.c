@@ -8,18 +8,74 @@
 
 // ---------------------------------------------------------------- a scene
 
+// which equations the water gets: turbulence, rheology, walls, time, sizes, air, forces
+static void info_model(const silt_scene *scene, FILE *to) {
+    static const char *const turbulence[] = {"", "no turbulence model", "mixing length", "Smagorinsky", "WALE"};
+    static const char *const near[] = {"", "regions", "walls", "bed", "bodies", "the surface"};
+    static const char *const formula[] = {"at rest", "uniform",      "solid rotation", "shear",
+                                          "strain",  "Taylor-Green", "standing wave",  "solitary wave",
+                                          "field",   "central",      "series"};
+    const silt_fluid_def *fluid = &scene->fluid;
+    fprintf(to, "  model      %s, %s", fluid->flow == FLOW_LAMINAR ? "laminar" : "turbulent",
+            turbulence[fluid->turbulence]);
+    if (fluid->rheology == RHEOLOGY_NEWTONIAN)
+        fprintf(to, ", Newtonian");
+    else if (fluid->rheology == RHEOLOGY_BINGHAM)
+        fprintf(to, ", Bingham with %g Pa, smoothed below %g 1/s", fluid->yield_stress, fluid->plastic_rate);
+    else
+        fprintf(to, ", Herschel-Bulkley with %g Pa and index %g, smoothed below %g 1/s", fluid->yield_stress,
+                fluid->flow_index, fluid->plastic_rate);
+    fprintf(to, "\n  steps      %s, theta %g%s\n", fluid->scheme == SCHEME_IMPLICIT ? "implicit" : "fractional step",
+            fluid->theta, fluid->theta == 0.5 ? " (second order)" : "");
+    // walls by what they do to the water
+    int n[3] = {0}, n_rough = 0, n_moving = 0;
+    for (int i = 0; i < scene->n_wall; i++) {
+        n[scene->wall[i].condition == WALL_DEFAULT ? WALL_NO_SLIP : scene->wall[i].condition]++;
+        n_rough += scene->wall[i].condition == WALL_LAW && scene->wall[i].roughness > 0;
+        n_moving += scene->wall[i].motion.n_row > 0;
+    }
+    fprintf(to, "  condition  %d walls no-slip, %d slip, %d wall law", n[WALL_NO_SLIP], n[WALL_SLIP], n[WALL_LAW]);
+    if (n[WALL_LAW])
+        fprintf(to, " (%d rough; sampled %g h off)", n_rough, fluid->wall_height);
+    fprintf(to, n_moving ? ", %d of them moving\n" : "\n", n_moving);
+    if (fluid->n_size) {
+        double least = fluid->size;
+        fprintf(to, "  sizes     ");
+        for (int i = 0; i < fluid->n_size; i++) {
+            fprintf(to, "%s %g m near %s", i ? "," : "", fluid->size_at[i].size, near[fluid->size_at[i].near]);
+            least = silt_min(least, fluid->size_at[i].size);
+        }
+        fprintf(to, "; least %g m, growing by %g per distance\n", least, fluid->size_growth);
+    }
+    if (fluid->velocity.kind)
+        fprintf(to, "  start      velocity: %s\n", formula[fluid->velocity.kind]);
+    if (fluid->force.kind)
+        fprintf(to, "  force      body force: %s\n", formula[fluid->force.kind]);
+    if (fluid->air_pressure > 0)
+        fprintf(to, "  air        closed pockets, %g Pa when they close, exponent %g\n", fluid->air_pressure,
+                fluid->air_exponent);
+    if (scene->period[0] < scene->period[1])
+        fprintf(to, "  periodic   in x from %g to %g m\n", scene->period[0], scene->period[1]);
+}
+
 static void info_scene(const silt_scene *scene, FILE *to) {
     const silt_fluid_def *fluid = &scene->fluid;
     const silt_bed_def *bed = &scene->bed;
     fprintf(to, "%s\n", scene->title && *scene->title ? scene->title : "untitled");
     fprintf(to, "  scene      %s, hash %016llx\n", scene->path, (unsigned long long)scene->hash);
+    fprintf(to,
+            scene->dimension == 3 ? "  space      three dimensions, z up\n" : "  space      two dimensions, y up\n");
     fprintf(to, "  time       to %g s, output every %g s\n", scene->time.end, scene->time.output);
     if (fluid->on) {
         double area = 0;
         for (int i = 0; i < fluid->n_region; i++)
             area += silt_region_area(&fluid->region[i]);
-        fprintf(to, "  water      %g kg/m3, %g Pa s, spacing %g m, %d regions of %g m2: about %.0f nodes\n",
-                fluid->density, fluid->viscosity, fluid->size, fluid->n_region, area, area / silt_square(fluid->size));
+        const bool space = scene->dimension == 3;
+        fprintf(to, "  water      %g kg/m3, %g Pa s, spacing %g m, %d regions of %g %s: about %.0f nodes%s\n",
+                fluid->density, fluid->viscosity, fluid->size, fluid->n_region, area, space ? "m3" : "m2",
+                area / (silt_square(fluid->size) * (space ? fluid->size : 1)),
+                fluid->n_size ? " without the sizes" : "");
+        info_model(scene, to);
         if (fluid->n_inlet || fluid->n_outlet)
             fprintf(to, "  openings   %d inlets, %d outlets\n", fluid->n_inlet, fluid->n_outlet);
     }

@@ -16,7 +16,7 @@ typedef struct main_arguments {
     const char **set; // owned, -D
     silt_run_def run;
     int frame; // -1 all, -2 the last
-    const char *field, *to;
+    const char *field, *slice, *to;
 } main_arguments;
 
 typedef struct main_command {
@@ -28,7 +28,7 @@ typedef struct main_command {
 
 // ---------------------------------------------------------------- options
 
-enum { OPTION_UNTIL = 'u', OPTION_THREADS = 't', OPTION_FORCE = 'f', OPTION_FRAME = 'n', OPTION_FIELD = 'c' };
+enum { OPTION_UNTIL = 'u', OPTION_THREADS = 't', OPTION_FORCE = 'f', OPTION_FRAME = 'n', OPTION_FIELD = 'c', OPTION_SLICE = 'l' };
 #define LONG_ONLY(key) ((key) + 256)
 
 static const struct argp_option main_options[] = {
@@ -40,7 +40,8 @@ static const struct argp_option main_options[] = {
     {"force", LONG_ONLY(OPTION_FORCE), NULL, 0, "replace an output folder that is there", 0},
     {"worker", LONG_ONLY('w'), "PATH", OPTION_HIDDEN, "the silt-dem program", 0},
     {"frame", LONG_ONLY(OPTION_FRAME), "N|all", 0, "the frame to draw; default: the last", 0},
-    {"field", LONG_ONLY(OPTION_FIELD), "NAME", 0, "speed (default), pressure, porosity, mesh or bed", 0},
+    {"field", LONG_ONLY(OPTION_FIELD), "NAME", 0, "speed (default), pressure, elevation, vorticity, porosity, mesh or bed", 0},
+    {"slice", LONG_ONLY(OPTION_SLICE), "PLANE", 0, "a cut through three dimensions, for example y=0.5", 0},
     {"to", LONG_ONLY('d'), "FOLDER", 0, "where the pictures go; default: OUT", 0},
 };
 enum { N_OPTION = sizeof main_options / sizeof main_options[0] };
@@ -90,6 +91,9 @@ static error_t main_option(int key, char *text, struct argp_state *state) {
         return 0;
     case LONG_ONLY(OPTION_FIELD):
         a->field = text;
+        return 0;
+    case LONG_ONLY(OPTION_SLICE):
+        a->slice = text;
         return 0;
     case LONG_ONLY('d'):
         a->to = text;
@@ -155,7 +159,7 @@ static silt_status main_draw(const main_arguments *a, silt_error *err) {
     SILT_TRY(main_out(a, err));
     if (a->to && mkdir(a->to, 0777) != 0 && errno != EEXIST)
         return silt_fail(err, SILT_FAILED, "%s: cannot be made (%s)", a->to, strerror(errno));
-    return silt_draw(a->path, a->frame, a->field, a->to, stdout, err);
+    return silt_draw(a->path, a->frame, a->field, a->slice, a->to, stdout, err);
 }
 
 static silt_status main_info(const main_arguments *a, silt_error *err) {
@@ -170,7 +174,7 @@ static const main_command main_commands[] = {
     {"resume", "OUT", "Goes on from the newest whole checkpoint in OUT; with --until also a finished run.", "utqw",
      main_resume},
     {"verify", "OUT", "Holds the results in OUT against the checks of the scene, a line per check.", "", main_verify},
-    {"draw", "OUT", "Draws frames of a run as PNG pictures.", "ncd", main_draw},
+    {"draw", "OUT", "Draws frames of a run as PNG pictures.", "ncdl", main_draw},
     {"info", "OUT|SCENE", "Tells what a scene asks for, or what stands in an output folder.", "", main_info},
     {"help", "[KEY]", "Explains the keys of a scene: all of them, a block, or one, for example fluid.size.", "",
      main_help},

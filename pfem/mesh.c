@@ -308,14 +308,18 @@ static double tetrahedron_volume(const double *a, const double *b, const double 
     return (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6;
 }
 
+double silt_simplex_volume(int dim, const double *c) {
+    if (dim != 3)
+        return 0.5 * ((c[2] - c[0]) * (c[5] - c[1]) - (c[3] - c[1]) * (c[4] - c[0]));
+    return tetrahedron_volume(c, c + 3, c + 6, c + 9);
+}
+
 double silt_cell_volume(const silt_mesh *mesh, const double *x, int e) {
     const int *cell = mesh->cell[e];
     if (mesh->period[0] > 0 || mesh->period[1] > 0 || mesh->period[2] > 0) {
         double c[12];
         silt_cell_corners(mesh, x, cell, c);
-        if (mesh->dim != 3)
-            return 0.5 * ((c[2] - c[0]) * (c[5] - c[1]) - (c[3] - c[1]) * (c[4] - c[0]));
-        return tetrahedron_volume(c, c + 3, c + 6, c + 9);
+        return silt_simplex_volume(mesh->dim, c);
     }
     if (mesh->dim != 3)
         return silt_cell_area(x, cell);

@@ -4,44 +4,73 @@
 void silt_run_prescribe(silt_run *run) {
     const silt_scene *scene = run->scene;
     silt_nodes *nodes = &run->nodes;
+    const int D = silt_nodes_dim(nodes);
     const silt_body_state *bodies = run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
     for (int i = 0; i < nodes->count; i++) {
-        double *v = nodes->v + 2 * i;
+        double *v = nodes->v + D * i;
         if (nodes->kind[i] == NODE_INLET) {
             const silt_inlet *inlet = &scene->fluid.inlet[nodes->owner[i]];
             const double factor = inlet->series.n_row ? silt_series_at(&inlet->series, 1, run->time + 0.5 * run->dt) : 1;
-            v[0] = factor * inlet->velocity[0];
-            v[1] = factor * inlet->velocity[1];
+            for (int d = 0; d < D; d++)
+                v[d] = factor * inlet->velocity[d];
         } else if (nodes->kind[i] == NODE_BODY && bodies) {
             const struct silt_body *body = &bodies->body[nodes->owner[i]];
             v[0] = body->v[0] - body->w[2] * (nodes->x[2 * i + 1] - body->x[1]);
             v[1] = body->v[1] + body->w[2] * (nodes->x[2 * i] - body->x[0]);
-        } else if (nodes->kind[i] == NODE_CORNER)
-            v[0] = v[1] = 0;
+        } else if (nodes->kind[i] == NODE_CORNER) {
+            double wall[3] = {0};
+            if (nodes->owner[i] >= 0)
+                silt_walls_velocity(&run->walls, scene, nodes->owner[i], nodes->x + D * i, wall);
+            memcpy(v, wall, (size_t)D * sizeof(double));
+        }
     }
+}
+
+// gravity and body force at a place, m/s2
+static void acceleration(const silt_run *run, const double *x, double a[3]) {
+    const int D = silt_nodes_dim(&run->nodes);
+    memcpy(a, run->scene->gravity, 3 * sizeof *a);
+    if (run->scene->fluid.force.kind == FORMULA_NONE)
+        return;
+    double place[3] = {0}, more[3];
+    memcpy(place, x, (size_t)D * sizeof(double));
+    silt_formula_acceleration(&run->scene->fluid.force, run->time + 0.5 * run->dt, place, more);
+    for (int d = 0; d < 3; d++)
+        a[d] += more[d];
 }
 
 // drops: free flight, along walls where they lie on one
 static void fly(silt_run *run, int i) {
     silt_nodes *nodes = &run->nodes;
-    double *x = nodes->x + 2 * i, *v = nodes->v + 2 * i;
-    const double dt = run->dt, *g = run->scene->gravity;
-    double a[2] = {g[0], g[1]};
+    const int D = silt_nodes_dim(nodes);
+    double *x = nodes->x + D * i, *v = nodes->v + D * i, a[3];
+    const double dt = run->dt;
+    acceleration(run, x, a);
     const int s = nodes->wall[i][0];
     if (s >= 0) {
-        const double *n = run->walls.normal[s], an = a[0] * n[0] + a[1] * n[1];
-        const bool held = an <= 0;
-        if (held && (nodes->wall[i][1] >= 0 || !run->walls.slip[s])) {
-            v[0] = v[1] = 0; // stuck, or in a corner
-            return;
-        }
-        if (held) {
-            a[0] -= an * n[0];
-            a[1] -= an * n[1];
+        double vector[3], own[3], given[3];
+        silt_walls_velocity(&run->walls, run->scene, s, x, own);
+        const double *n = run->walls.normal[s], an = silt_dot(D, a, n), vn = silt_dot(D, v, n);
+        // pressed on: left alone it would come nearer to the wall than the wall goes away from it
+        if (vn - silt_dot(D, own, n) + 0.5 * dt * an <= 0) {
+            silt_walls_given(&run->walls, run->scene, nodes->wall[i], x, given);
+            const silt_hold hold = silt_walls_hold(&run->walls, nodes->wall[i], vector);
+            if (hold == HOLD_ALL) { // stuck, or in a corner
+                for (int d = 0; d < D; d++) {
+                    v[d] = given[d];
+                    x[d] += dt * v[d];
+                }
+                return;
+            }
+            const double along = silt_dot(D, a, vector), speed = silt_dot(D, v, vector);
+            for (int d = 0; d < D; d++) {
+                a[d] = hold == HOLD_NORMAL ? a[d] - along * vector[d] : along * vector[d];
+                v[d] = (hold == HOLD_NORMAL ? v[d] - speed * vector[d] : speed * vector[d]) + given[d];
+            }
         } else
-            nodes->wall[i][0] = nodes->wall[i][1] = -1;
+            nodes->wall[i][0] = nodes->wall[i][1] = nodes->wall[i][2] = -1;
     }
-    for (int d = 0; d < 2; d++) {
+    for (int d = 0; d < D; d++) {
         x[d] += dt * (v[d] + 0.5 * dt * a[d]);
         v[d] += dt * a[d];
     }
@@ -51,15 +80,21 @@ static void fly(silt_run *run, int i) {
 static void let_go(silt_run *run) {
     silt_nodes *nodes = &run->nodes;
     const silt_fluid *fluid = &run->fluid;
+    const int D = silt_nodes_dim(nodes);
     for (int i = 0; i < fluid->n_node; i++) {
-        const int s = nodes->wall[i][0];
-        if (nodes->kind[i] != NODE_FLUID || s < 0 || !run->mesh.wet[i] || !run->mesh.surface[i])
+        if (nodes->kind[i] != NODE_FLUID || nodes->wall[i][0] < 0 || !run->mesh.wet[i] || !run->mesh.surface[i])
             continue;
-        const double *n = run->walls.normal[s], *r = fluid->reaction + 2 * i;
-        const double pull = -(r[0] * n[0] + r[1] * n[1]);
-        const double weight = fluid->mass[i] * hypot(run->scene->gravity[0], run->scene->gravity[1]);
-        if (pull > 0.05 * weight && pull > 0)
-            nodes->wall[i][0] = nodes->wall[i][1] = -1;
+        // every wall that pulls
+        int kept = 0, wall[3] = {-1, -1, -1};
+        double a[3];
+        acceleration(run, nodes->x + D * i, a);
+        const double weight = fluid->mass[i] * silt_length(D, a);
+        for (int k = 0; k < 3 && nodes->wall[i][k] >= 0; k++) {
+            const double pull = -silt_dot(D, fluid->reaction + D * i, run->walls.normal[nodes->wall[i][k]]);
+            if (!(pull > 0.05 * weight && pull > 0))
+                wall[kept++] = nodes->wall[i][k];
+        }
+        memcpy(nodes->wall[i], wall, sizeof wall);
     }
 }
 
@@ -86,12 +121,15 @@ static void place_bodies(silt_run *run) {
 // water that crossed an outlet, or left the box of the scene
 static void let_out(silt_run *run) {
     silt_nodes *nodes = &run->nodes;
+    const int D = silt_nodes_dim(nodes);
     for (int i = 0; i < nodes->count; i++) {
         if (nodes->kind[i] != NODE_FLUID || run->memory.dead[i])
             continue;
-        const double *x = nodes->x + 2 * i, *old = run->x_old + 2 * i;
-        bool gone = x[0] < run->box_lo[0] || x[0] > run->box_hi[0] || x[1] < run->box_lo[1] || x[1] > run->box_hi[1];
-        for (int k = 0; k < run->scene->fluid.n_outlet && !gone; k++) {
+        const double *x = nodes->x + D * i, *old = run->x_old + D * i;
+        bool gone = false;
+        for (int d = 0; d < D; d++)
+            gone |= (run->mesh.period[d] <= 0 && (x[d] < run->box_lo[d] || x[d] > run->box_hi[d])) || !isfinite(x[d]);
+        for (int k = 0; D == 2 && k < run->scene->fluid.n_outlet && !gone; k++) {
             const silt_outlet *outlet = &run->scene->fluid.outlet[k];
             const double dx = outlet->to[0] - outlet->from[0], dy = outlet->to[1] - outlet->from[1];
             const double side = dx * (x[1] - outlet->from[1]) - dy * (x[0] - outlet->from[0]);
@@ -99,33 +137,32 @@ static void let_out(silt_run *run) {
             const double along = (dx * (x[0] - outlet->from[0]) + dy * (x[1] - outlet->from[1])) / (dx * dx + dy * dy);
             gone = side < 0 && before >= -1e-12 * (dx * dx + dy * dy) && along > -0.05 && along < 1.05;
         }
-        if (!gone)
-            continue;
-        run->memory.dead[i] = NODE_LEFT;
+        if (gone)
+            run->memory.dead[i] = NODE_LEFT;
     }
 }
 
 // water nodes that ended up in something solid: flying ones are put outside, wet ones leave their volume to their cells
 static void expel(silt_run *run) {
     silt_nodes *nodes = &run->nodes;
+    const int D = silt_nodes_dim(nodes);
     if (!run->barrier.bed && !run->barrier.bodies)
         return;
     const silt_barrier solid = {.bed = run->barrier.bed, .bodies = run->barrier.bodies};
     for (int i = 0; i < nodes->count; i++) {
-        if (nodes->kind[i] != NODE_FLUID || run->memory.dead[i] || !silt_barrier_contains(&solid, nodes->x + 2 * i))
+        if (nodes->kind[i] != NODE_FLUID || run->memory.dead[i] || !silt_barrier_contains(&solid, nodes->x + D * i))
             continue;
         const bool wet = i < run->mesh.n_node && run->mesh.wet[i];
-        if (wet) {
+        // a flying one goes back where it came from, at rest; inside there too, or wet: its volume goes to the water around it
+        const double *old = run->x_old + D * i;
+        if (wet || silt_barrier_contains(&solid, old)) {
             run->memory.dead[i] = 1;
             continue;
         }
-        // back where it came from, at rest; inside there too: to the nearest node of the water, whose volume grows
-        const double *old = run->x_old + 2 * i;
-        if (!silt_barrier_contains(&solid, old)) {
-            memcpy(nodes->x + 2 * i, old, 2 * sizeof(double));
-            nodes->v[2 * i] = nodes->v[2 * i + 1] = 0;
-        } else
-            run->memory.dead[i] = 1;
+        for (int d = 0; d < D; d++) {
+            nodes->x[D * i + d] = old[d];
+            nodes->v[D * i + d] = 0;
+        }
     }
 }
 
@@ -164,13 +201,15 @@ static void carry_slip(silt_run *run) {
 static void hand_on_landing(silt_run *run, const int *wall_before, const double *v_before) {
     const silt_mesh *mesh = &run->mesh;
     silt_nodes *nodes = &run->nodes;
+    const int D = silt_nodes_dim(nodes);
     for (int i = 0; i < mesh->n_node; i++) {
         const int s = nodes->wall[i][0];
         if (wall_before[i] >= 0 || s < 0 || run->walls.slip[s] || !mesh->wet[i])
             continue;
-        const double *n = run->walls.normal[s], tangent[2] = {n[1], -n[0]};
-        const double momentum = run->fluid.mass[i] * (v_before[2 * i] * tangent[0] + v_before[2 * i + 1] * tangent[1]);
-        double mass = 0;
+        const double *n = run->walls.normal[s], *v = v_before + D * i;
+        double momentum[3], mass = 0;
+        for (int d = 0; d < D; d++)
+            momentum[d] = run->fluid.mass[i] * (v[d] - silt_dot(D, v, n) * n[d] - nodes->v[D * i + d]);
         for (int pass = 0; pass < 2; pass++)
             for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++) {
                 const int j = mesh->neighbour[k];
@@ -179,8 +218,8 @@ static void hand_on_landing(silt_run *run, const int *wall_before, const double 
                 if (pass == 0)
                     mass += run->fluid.mass[j];
                 else
-                    for (int d = 0; d < 2; d++)
-                        nodes->v[2 * j + d] += momentum / mass * tangent[d];
+                    for (int d = 0; d < D; d++)
+                        nodes->v[D * j + d] += momentum[d] / mass;
             }
     }
 }
@@ -218,7 +257,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     silt_nodes *nodes = &run->nodes;
     silt_mesh *mesh = &run->mesh;
     const double h = scene->fluid.size, rho = scene->fluid.density;
-    const int n = nodes->count;
+    const int n = nodes->count, D = silt_nodes_dim(nodes);
 
     const double since = silt_seconds();
     // material motion; all nodes, so that the old cells hold what continuity gave them
@@ -226,23 +265,27 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     let_go(run);
     for (int i = 0; i < n; i++)
         if (mesh->wet[i])
-            for (int d = 0; d < 2; d++)
-                nodes->x[2 * i + d] += run->dt * run->fluid.w[2 * i + d];
+            for (int k = D * i; k < D * (i + 1); k++)
+                nodes->x[k] += run->dt * silt_mesh_velocity(&run->fluid, k);
     const double moved = silt_mesh_volume(mesh, nodes->x);
     // inlets stay on their line: what they leave behind them is new water; slip nodes of the bed stay too
     for (int i = 0; i < n; i++)
         if (nodes->kind[i] == NODE_INLET)
-            memcpy(nodes->x + 2 * i, run->x_old + 2 * i, 2 * sizeof(double));
+            memcpy(nodes->x + D * i, run->x_old + D * i, (size_t)D * sizeof(double));
     const double fed = silt_mesh_volume(mesh, nodes->x);
     run->ledger.inflow_mass += rho * (fed - moved);
     run->ledger.volume_solved += run->fluid.solved_volume;
+    run->ledger.volume_given += run->fluid.given_back;
     run->ledger.volume_moved += moved - before - run->fluid.solved_volume - run->fluid.given_back;
+    if (scene->fluid.air_pressure > 0)
+        silt_pockets_advance(&run->pockets, scene, mesh, run->x_old, nodes->x);
+    silt_nodes_shuffle(nodes, mesh, scene, run->step);
     silt_memory_take(&run->memory, mesh, nodes);
 
     // from here on positions are mended: what that does to the volume is booked by the rebuild
     for (int i = 0; i < n; i++) {
         if (nodes->kind[i] == NODE_BED && run->fluid.hold[i] == 1)
-            memcpy(nodes->x + 2 * i, run->x_old + 2 * i, 2 * sizeof(double));
+            memcpy(nodes->x + D * i, run->x_old + D * i, (size_t)D * sizeof(double));
         if (!mesh->wet[i] && nodes->kind[i] == NODE_FLUID)
             fly(run, i);
     }
@@ -250,15 +293,15 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     place_bodies(run);
     silt_run_bed_sync(run);
     silt_memory_extend(&run->memory, nodes->count);
-    SILT_RESERVE(run->x_old, run->x_old_capacity, 2 * nodes->count + 2);
-    for (int k = 2 * n; k < 2 * nodes->count; k++)
+    SILT_RESERVE(run->x_old, run->x_old_capacity, D * (nodes->count + 1));
+    for (int k = D * n; k < D * nodes->count; k++)
         run->x_old[k] = nodes->x[k];
     remember_bed(run);
     SILT_RESERVE(run->wall_before, run->wall_before_capacity, nodes->count + 1);
-    SILT_RESERVE(run->v_before, run->v_before_capacity, 2 * nodes->count + 2);
+    SILT_RESERVE(run->v_before, run->v_before_capacity, D * (nodes->count + 1));
     for (int i = 0; i < nodes->count; i++)
         run->wall_before[i] = nodes->wall[i][0];
-    memcpy(run->v_before, nodes->v, 2 * (size_t)nodes->count * sizeof(double));
+    memcpy(run->v_before, nodes->v, (size_t)(D * nodes->count) * sizeof(double));
     silt_walls_contact(&run->walls, nodes, run->x_old, run->memory.interior, h);
     hand_on_landing(run, run->wall_before, run->v_before);
     let_out(run);
@@ -268,7 +311,14 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     const double middle = silt_seconds();
     run->phase[PHASE_move] += middle - since;
     SILT_RESERVE(run->map, run->map_capacity, nodes->count + 1);
+    SILT_RESERVE(run->v_before, run->v_before_capacity, D * (nodes->count + 1));
+    SILT_RESERVE(run->debt_before, run->debt_before_capacity, nodes->count + 1);
+    memcpy(run->v_before, nodes->v, (size_t)(D * nodes->count) * sizeof(double));
+    memcpy(run->debt_before, nodes->debt, (size_t)nodes->count * sizeof(double));
+    run->memory.record = true;
     SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
+    double lost[3];
+    silt_momentum_hand_on(&run->memory, mesh, nodes, rho, NULL, run->debt_before, run->v_before, run->map, lost);
     run->ledger.volume_reconnected += run->memory.reconnected;
     // without an outlet nothing may leave: what does anyway shows as a volume error
     if (scene->fluid.n_outlet)
@@ -276,6 +326,8 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     for (int k = 0; k < run->bed.n_node; k++)
         if (run->bed.fluid_node[k] >= 0)
             run->bed.fluid_node[k] = run->map[run->bed.fluid_node[k]];
+    silt_size_update(run->size, nodes, mesh);
+    SILT_TRY(silt_run_pockets(run, err));
     silt_locator_build(&run->locator, mesh, nodes->x, h);
     run->phase[PHASE_mesh] += silt_seconds() - middle;
     return SILT_OK;

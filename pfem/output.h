@@ -25,6 +25,7 @@ typedef struct silt_view {
     const silt_grain_state *grains;
     const silt_body_state *bodies;
     const silt_ledger *ledger;
+    const double (*wall_force)[3]; // N, of the water on each wall of the scene in the last step (silt_wall_forces), NULL: none
     int64_t step;
     double time, dt;
     double wall[PHASE_COUNT]; // s, of the last step
@@ -41,6 +42,16 @@ void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value)
 /** what gauges keep from the start goes through checkpoints: after a resume create, then load */
 silt_status silt_gauges_save(const silt_gauges *gauges, silt_store *store, silt_error *err);
 silt_status silt_gauges_load(silt_gauges *gauges, silt_store *store, silt_error *err);
+/** Shares the reactions of a step among the walls of the scene; before its nodes move, while they are those of the step.
+ * Where walls meet, a reaction is taken apart along their normals; what these do not span is halved.
+ * @param reaction  dim per node, N, force of walls, bed and bodies on the water (silt_fluid)
+ * @param force  out, one per wall of the scene, N, force of the water on it; in 2-D per m of width, z = 0 */
+void silt_wall_forces(const silt_walls *walls, const silt_nodes *nodes, const silt_mesh *mesh, const double *reaction,
+                      double (*force)[3]);
+/** Angular momentum of the water about a point, kg m2/s: sum of lumped mass times arm times velocity, drops included, the
+ * share of grains (solid, one per node, NULL: none) left out. In 2-D the last component only. */
+void silt_water_moment(const silt_nodes *nodes, const silt_mesh *mesh, const double *solid, double density,
+                       const double about[3], double moment[3]);
 
 // history.c ----------------------------------------------------------------------------------------
 typedef struct silt_history silt_history;
@@ -63,6 +74,24 @@ typedef struct silt_frame_entry {
 } silt_frame_entry;
 /** the frames that OUT's indices name, in order. @return how many; *entry is owned by the caller */
 int silt_frame_index(const char *out, silt_frame_entry **entry);
+
+// grid.c -------------------------------------------------------------------------------------------
+/** what one file of a frame holds */
+typedef struct silt_grid {
+    int n_point, n_cell;
+    double *x;      // owned, 3 per point, m
+    int *offset;    // owned, n_cell + 1: where the corners of each cell begin in `link`
+    int *link;      // owned, points of the cells
+    double *value;  // owned, the array that was asked for, `width` numbers a point (or cell); NULL: it is not there
+    int width;
+    double *radius; // owned, grains only
+    int *kind;      // owned, silt_node_kind of the fluid's points, silt_facet_kind of the surface's cells; NULL elsewhere
+    double time;    // s
+} silt_grid;
+/** Reads OUT/PART_NNNNNN.hdf; array like "PointData/pressure", NULL: none. @return false when there is no such file */
+bool silt_grid_read(silt_grid *grid, const char *out, const char *part, int number, const char *array);
+void silt_grid_clear(silt_grid *grid);
+static inline int silt_grid_corners(const silt_grid *grid, int cell) { return grid->offset[cell + 1] - grid->offset[cell]; }
 
 // summary.c ----------------------------------------------------------------------------------------
 typedef struct silt_summary {
@@ -90,13 +119,15 @@ typedef struct silt_check_result {
 /** Holds OUT/history.csv against the scene's checks; result has scene->n_check items. References are looked for in OUT
  * first, then beside the scene. A check that cannot be measured fails with a note; only an unreadable history is an error. */
 silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_check_result *result, silt_error *err);
-/** Copies the files that the scene reads (references, series) into OUT and writes OUT/scene.yaml: the resolved scene,
+/** Copies the files that the scene reads (references, series, surfaces, outlines, clouds) into OUT and writes OUT/scene.yaml: the resolved scene,
  * which names the copies, so that OUT can be verified, resumed and run again anywhere. */
 silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err);
 /** Holds OUT against the checks of OUT/scene.yaml; prints a line a check to `to`. SILT_FAILED when one fails. */
 silt_status silt_verify(const char *out, FILE *to, silt_error *err);
-/** PNG pictures of frames: frame -1 all, -2 the last; field: mesh, pressure, speed, porosity, bed. Written as OUT/picture_NNNNNN.png */
-silt_status silt_draw(const char *out, int frame, const char *field, const char *to, FILE *say, silt_error *err);
+/** PNG pictures of frames: frame -1 all, -2 the last; field: mesh, pressure, speed, elevation, vorticity, porosity, bed (NULL:
+ * speed); slice: "y=0.5" for a plane cut through three dimensions, NULL: none; written as TO/picture_NNNNNN.png (NULL: OUT) */
+silt_status silt_draw(const char *out, int frame, const char *field, const char *slice, const char *to, FILE *say,
+                      silt_error *err);
 silt_status silt_info(const char *path, FILE *to, silt_error *err);
 /** warn.c: prints what is allowed but probably not meant, a line each; @return how many */
 int silt_scene_warn(const silt_scene *scene, FILE *to);

@@ -39,13 +39,15 @@ typedef struct silt_nodes {
 
 static inline int silt_nodes_dim(const silt_nodes *nodes) { return nodes->dim == 3 ? 3 : 2; }
 /** wanted distance of node i to its neighbours; size: fluid.size */
-static inline double silt_node_h(const silt_nodes *nodes, int i, double size) { return nodes->h ? nodes->h[i] : size; }
+static inline double silt_node_h(const silt_nodes *nodes, int i, double size) {
+    return nodes->h && nodes->h[i] > 0 ? nodes->h[i] : size; // 0: added since the last silt_size_update
+}
 
 // ---------------------------------------------------------------- walls (wall.c)
 
 /** where a moving wall of the scene stands and how it moves */
 typedef struct silt_wall_motion {
-    double shift[3], angle;   // m and rad, from the place in the scene; in 3-D the angle is about the y axis
+    double shift[3], angle;   // m and rad, from the place in the scene; the angle turns from x to y, in 3-D from x to z
     double velocity[3], spin; // m/s of the centre, rad/s
     double centre[3];         // m, what it turns about, at its present place
 } silt_wall_motion;
@@ -66,27 +68,61 @@ typedef struct silt_walls {
     int (*joined)[3];            // owned, 3-D: element across the edge that starts at each corner, -1
     int n_wall;
     silt_wall_motion *motion;    // owned, one per wall of the scene
-    struct silt_wall_index *index; // owned, elements by place (wall.c)
+    int n_degenerate;            // triangles of surface files without area, left out
+    struct silt_wall_index *index; // owned, elements by place, what moves (wall.h)
 } silt_walls;
 
 /** which components of a node's velocity are held */
 typedef enum { HOLD_FREE = 0, HOLD_NORMAL, HOLD_ALL, HOLD_LINE } silt_hold; // LINE: free along one direction only
 
-void silt_walls_create(silt_walls *walls, const silt_scene *scene);
+/** Builds the walls of a scene where they stand at time 0: polylines in 2-D, boxes and surfaces from files in 3-D. Elements that
+ * meet are joined, also of different walls, but not with a wall that moves. Errors (SILT_INPUT): a surface file that cannot
+ * serve, see wall.h; the walls are empty then. */
+silt_status silt_walls_create(silt_walls *walls, const silt_scene *scene, silt_error *err);
 void silt_walls_clear(silt_walls *walls);
 /** Places the walls that move where they are at `time`; their velocities are those that carry them there from `time - dt`.
  * @param dt  s, the step that ends at `time`; 0: the velocity of that moment */
 void silt_walls_move(silt_walls *walls, const silt_scene *scene, double time, double dt);
 /** How the elements hold a node: vector is the unit normal (HOLD_NORMAL) or the free direction (HOLD_LINE) */
 silt_hold silt_walls_hold(const silt_walls *walls, const int element[3], double vector[3]);
-/** velocity of the wall's material at x, m/s: its motion and its surface velocity */
+/** Velocity of the wall's material that was at x at the start of the step, m/s: the way that it goes in the step over dt, and
+ * the surface's velocity along itself. */
 void silt_walls_velocity(const silt_walls *walls, const silt_scene *scene, int element, const double *x, double v[3]);
+/** The held part of the velocity of a node at x (start of the step): along the normal (HOLD_NORMAL), across the line (HOLD_LINE),
+ * all of it (HOLD_ALL), 0 (HOLD_FREE). A node that moves with it and any free part lands on the walls where they are now. */
+void silt_walls_given(const silt_walls *walls, const silt_scene *scene, const int element[3], const double *x, double v[3]);
+/** Normals at nodes on patches that bend: those of the water's own facets on the patch around the node, weighted with their size.
+ * With the elements' normals water would pass between nodes on two sides of a bend (Engelman, Sani and Gresho 1982). */
+typedef struct silt_wall_normals {
+    int n_row, row_capacity, normal_capacity;
+    int *row;               // owned, one per node: its row of normals, -1: the elements' normals; NULL without bent patches
+    double (*normal)[3][3]; // owned, one for each of the node's elements, unit
+} silt_wall_normals;
+struct silt_mesh;
+/** @param x  positions that the facets have when what passes through them is counted: those of the midpoint mesh. Normals of any
+ * other moment leave a rest that a full tank can only answer with a pressure without bounds. */
+void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls, const silt_nodes *nodes, const struct silt_mesh *mesh,
+                            const double *x);
+void silt_wall_normals_clear(silt_wall_normals *normals);
+/** silt_walls_hold and silt_walls_given in one, with those normals. @param normals  NULL: the elements' */
+silt_hold silt_walls_held(const silt_walls *walls, const silt_scene *scene, const silt_wall_normals *normals, const silt_nodes *nodes,
+                          int i, double vector[3], double given[3]);
 /** true when the nodes share a patch: a facet between them lies on the wall */
 bool silt_walls_share(const silt_walls *walls, int n, const int *const element[]);
 /** Signed distance of a point to the nearest element, positive on the water's side; *element is that element (-1: no walls,
- * distance +inf). At a vertex the side is decided by the elements that meet there. */
+ * distance +inf). At edges and vertices the side is decided by the elements that meet there; inside of a closed obstacle it
+ * is negative whatever else is near. */
 double silt_walls_distance(const silt_walls *walls, const double *point, int *element);
-/** Nodes that lie on walls: puts them exactly on, lets them turn corners, attaches what has come through or touches. */
+/** Elements within reach of x that turn by more than 30 degrees from each other: none, or up to as many as dimensions, the nearest
+ * first, the rest -1; on is the point that lies exactly on all of them (x itself where there is none). @return how many */
+int silt_walls_touching(const silt_walls *walls, const double *x, double reach, int element[3], double on[3]);
+/** Where fixed nodes (NODE_CORNER) keep the shape of walls that point into the water: corners in 2-D, edges in 3-D with points at
+ * spacing h, bends above 30 degrees. Not where the edge lies on another wall (the foot of a gate, of a box on the floor).
+ * @return how many; *point (3 numbers each) and *element (owner first, then others, -1) are malloc'ed, owned by the caller */
+int silt_walls_ridges(const silt_walls *walls, double h, double **point, int (**element)[3]);
+/** Nodes that lie on walls, after all nodes have moved from x_old: carries fixed nodes and those on walls without slip with their
+ * walls, puts the others exactly on, lets them slide over bends and along creases, stop in corners and come free at edges,
+ * attaches what has come through a wall or touches it, fills empty creases and corners with the nearest node. */
 void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double *x_old, const uint8_t *interior, double h);
 
 // ---------------------------------------------------------------- nodes (node.c, seed.c)
@@ -96,10 +132,16 @@ void silt_nodes_clear(silt_nodes *nodes);
 int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double *x);
 /** Removes nodes with dead[i] != 0, keeps the order; map[i] is the new index or -1 */
 void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map);
-/** Fills the scene's regions with water nodes, inlets and tank corners; leaves out what lies in `solid` (bed, bodies). */
-typedef bool (*silt_solid_test)(const void *context, const double x[2], double margin);
+/** Fills the scene's regions with water nodes, inlets and tank corners; leaves out what lies in `solid` (bed, bodies). With
+ * fluid.sizes the spacing is the local one and nodes->h is written. */
+typedef bool (*silt_solid_test)(const void *context, const double *x, double margin);
 void silt_nodes_seed(silt_nodes *nodes, const silt_scene *scene, const silt_walls *walls, silt_solid_test solid,
                      const void *context);
+/** The same with the water's nodes from the file fluid.cloud: columns x, y[, z] and, if there, vx, vy[, vz], which then win over
+ * fluid.velocity. Nodes on walls are put onto them, those on inlets and tank corners are left out.
+ * Errors: SILT_INPUT, file and line of what is missing, not a number, behind a wall, in a solid, or there twice. */
+silt_status silt_nodes_read(silt_nodes *nodes, const silt_scene *scene, const silt_walls *walls, silt_solid_test solid,
+                            const void *context, silt_error *err);
 /** Points along a closed outline at spacing h, corners kept. @return how many; xy malloc'ed, owned by the caller */
 int silt_outline_points(int n, const double *outline, double h, double **xy);
 
@@ -108,12 +150,16 @@ int silt_outline_points(int n, const double *outline, double h, double **xy);
 typedef struct silt_size silt_size; // NULL: fluid.size everywhere
 /** Made from fluid.sizes; NULL without them. */
 void silt_size_create(silt_size **size, const silt_scene *scene, const silt_walls *walls);
-/** Follows what moves (surface, bed, bodies, walls) and writes nodes->h. */
+/** Follows what moves (surface, bed, bodies, wet walls) and writes nodes->h of every node; to be called after every rebuild. */
 struct silt_mesh;
 void silt_size_update(silt_size *size, silt_nodes *nodes, const struct silt_mesh *mesh);
+/** Points that stand for surface, bed or bodies until the first update, dim numbers each (the first cloud needs them). */
+void silt_size_near(silt_size *size, silt_near near, int n, const double *x);
 /** wanted distance between nodes at a point, m (at the last update); size NULL: fluid.size */
 double silt_size_at(const silt_size *size, const silt_scene *scene, const double *x);
 void silt_size_free(silt_size **size);
+/** signed distance from a region, m, negative inside; dim 3: polygons are upright prisms in x-z, circles are spheres */
+double silt_region_distance(const silt_region *region, int dim, const double *x);
 
 // ---------------------------------------------------------------- mesh (mesh.c)
 
@@ -153,6 +199,8 @@ void silt_cell_facet(int dim, const int *cell, int a, int facet[3]);
 bool silt_mesh_share(const silt_mesh *mesh, const silt_nodes *nodes, int n, const int *node);
 void silt_mesh_clear(silt_mesh *mesh);
 double silt_cell_area(const double *x, const int *cell); // 2-D
+/** m2 or m3 of a triangle or tetrahedron from its corners, dim numbers each */
+double silt_simplex_volume(int dim, const double *corner);
 /** m2 or m3 of a cell of the mesh, across a periodic border too */
 double silt_cell_volume(const silt_mesh *mesh, const double *x, int e);
 /** corners of a cell, dim numbers each, joined the shortest way across a periodic border */
@@ -197,8 +245,14 @@ void silt_memory_clear(silt_memory *memory);
 void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nodes *nodes);
 /** Makes the memory's flags as long as the cloud is now. */
 void silt_memory_extend(silt_memory *memory, int n_node);
-/** Marks crowded nodes dead and adds nodes where the mesh is stretched (refine.c). */
+/** Marks crowded nodes dead and adds nodes where the mesh is stretched, against the local size (refine.c). Nodes added on
+ * curved walls are put onto them (mesh->walls); velocity and pressure are those of the edge they split. The momentum that this
+ * moves is silt_momentum_hand_on's business.
+ * @param h  fluid.size */
 void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h);
+/** Shifts inner nodes by up to fluid.shuffle * h in each direction, their pressure and velocity with them along the mesh's
+ * gradients. The random numbers hang on fluid.seed, the step and the node's id. Before silt_memory_take. */
+void silt_nodes_shuffle(silt_nodes *nodes, const silt_mesh *mesh, const silt_scene *scene, int64_t step);
 
 /** what the water cannot enter */
 typedef struct silt_barrier {
@@ -337,6 +391,11 @@ typedef struct silt_ledger {
     double max_speed;                             // m/s, of the water's nodes
     // where volume went, cumulative, m3: solved (divergence left), moved (integration), reconnected (remeshing, nodes added and removed)
     double volume_solved, volume_moved, volume_reconnected;
+    double volume_refined; // nodes added and removed, cumulative
+    double volume_given;   // debts paid, cumulative
+    double volume_owed;    // debts of wet nodes that are still to be paid
+    double y_plus;         // distance of the wall law's sample in wall units, mean by length or area of its facets; NaN: none
+    double angular_momentum[3]; // kg m/s times m, of the water about the origin; in 2-D the last only
     // the larger of two, of the last step's solve: force on the water that its inertia does not answer, relative to weight and
     // inertia; force of the grains on the water plus force of the water on the grains, relative to what they exchange
     double momentum_error;

@@ -1,21 +1,31 @@
-// the pressure system: assembled row by row from the node's gradients, factored by CHOLMOD
+// the pressure system. 2-D: assembled row by row from the node's gradients, factored by CHOLMOD. 3-D: conjugate gradients on
+// the same operator, applied cell by cell, preconditioned by the factor of a compact Laplacian that resembles it
 #include <cholmod.h>
 #include <dlfcn.h>
 
 #include "fluid.h"
 
-struct silt_pressure {
-    cholmod_common common;
+/** a symmetric matrix and its factor */
+typedef struct silt_system {
     cholmod_factor *factor; // owned
     cholmod_sparse *matrix; // owned, lower triangle by columns
-    cholmod_dense *solution, *work_y, *work_e; // owned
     int64_t revision;       // of the mesh that pattern and factor belong to
+    bool compact;           // neighbours only, not nodes at distance two
+} silt_system;
+
+struct silt_pressure {
+    cholmod_common common;
+    silt_system main, stiff;   // S + L or a compact stand-in; L and the mass matrix over the viscosity
+    cholmod_dense *solution, *work_y, *work_e; // owned
     int n;
-    double (*gradient)[2];  // owned, G_ij along the mesh's neighbour lists
+    double *gradient;       // owned, dim per entry, G_ij along the mesh's neighbour lists
     int *mirror;            // owned, index of (j, i) for the entry (i, j)
-    int *place;             // owned, 9 per cell: where (i, j) stands in the neighbour lists
+    int *place;             // owned, (dim + 1)^2 per cell: where (i, j) stands in the neighbour lists
     uint8_t *pinned;        // owned, one per node: the pressure level of a closed piece of water
     double *row;            // owned
+    double *extra;          // owned, per node: what pins closed water, added to the operator's diagonal
+    double *cg[4], *work;   // owned, conjugate gradients: 1 per node; dim per node
+    int cg_capacity[4], work_capacity, extra_capacity;
     int *mark, *list;       // owned
     int gradient_capacity, mirror_capacity, place_capacity, pinned_capacity, row_capacity, mark_capacity, list_capacity;
 };
@@ -39,9 +49,12 @@ silt_pressure *silt_pressure_create(void) {
 void silt_pressure_forget(silt_pressure *pressure) {
     if (!pressure)
         return;
-    cholmod_free_factor(&pressure->factor, &pressure->common);
-    cholmod_free_sparse(&pressure->matrix, &pressure->common);
-    pressure->revision = -1;
+    silt_system *both[2] = {&pressure->main, &pressure->stiff};
+    for (int k = 0; k < 2; k++) {
+        cholmod_free_factor(&both[k]->factor, &pressure->common);
+        cholmod_free_sparse(&both[k]->matrix, &pressure->common);
+        both[k]->revision = -1;
+    }
 }
 
 void silt_pressure_free(silt_pressure **pressure) {
@@ -58,6 +71,10 @@ void silt_pressure_free(silt_pressure **pressure) {
     free(p->place);
     free(p->pinned);
     free(p->row);
+    free(p->extra);
+    for (int k = 0; k < 4; k++)
+        free(p->cg[k]);
+    free(p->work);
     free(p->mark);
     free(p->list);
     free(p);
@@ -96,24 +113,27 @@ static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     free(parent);
 }
 
-static void pattern_build(silt_pressure *p, const silt_mesh *mesh) {
-    const int n = mesh->n_node, n_entry = mesh->neighbour_start[n];
-    SILT_RESERVE(p->gradient, p->gradient_capacity, n_entry + 1);
-    SILT_RESERVE(p->mirror, p->mirror_capacity, n_entry + 1);
-    SILT_RESERVE(p->place, p->place_capacity, 9 * mesh->n_cell + 1);
+// lower triangle of the matrix, by columns: nodes at distance two, or neighbours only
+static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh *mesh, int D, bool compact) {
+    const int n = mesh->n_node, n_entry = mesh->neighbour_start[n], m = D + 1;
     SILT_RESERVE(p->row, p->row_capacity, n + 1);
     SILT_RESERVE(p->mark, p->mark_capacity, n + 1);
     SILT_RESERVE(p->list, p->list_capacity, n + 1);
-    for (int i = 0; i < n; i++)
-        for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++)
-            p->mirror[k] = neighbour_index(mesh, mesh->neighbour[k], i);
-    for (int e = 0; e < mesh->n_cell; e++)
-        for (int a = 0; a < 3; a++)
-            for (int b = 0; b < 3; b++)
-                p->place[9 * e + 3 * a + b] = neighbour_index(mesh, mesh->cell[e][a], mesh->cell[e][b]);
+    if (!compact) {
+        SILT_RESERVE(p->gradient, p->gradient_capacity, D * n_entry + 1);
+        SILT_RESERVE(p->mirror, p->mirror_capacity, n_entry + 1);
+        SILT_RESERVE(p->place, p->place_capacity, m * m * mesh->n_cell + 1);
+        for (int i = 0; i < n; i++)
+            for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++)
+                p->mirror[k] = neighbour_index(mesh, mesh->neighbour[k], i);
+        for (int e = 0; e < mesh->n_cell; e++)
+            for (int a = 0; a < m; a++)
+                for (int b = 0; b < m; b++)
+                    p->place[m * m * e + m * a + b] = neighbour_index(mesh, mesh->cell[e][a], mesh->cell[e][b]);
+    }
 
-    // lower triangle: nodes at distance two; count, then fill
-    cholmod_free_sparse(&p->matrix, &p->common);
+    // count, then fill
+    cholmod_free_sparse(&system->matrix, &p->common);
     int *start = silt_alloc((size_t)n + 1, sizeof *start);
     for (int pass = 0; pass < 2; pass++) {
         for (int j = 0; j < n; j++)
@@ -123,8 +143,13 @@ static void pattern_build(silt_pressure *p, const silt_mesh *mesh) {
             int count = 0;
             for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
                 const int i = mesh->neighbour[k];
-                for (int m = mesh->neighbour_start[i]; m < mesh->neighbour_start[i + 1]; m++) {
-                    const int c = mesh->neighbour[m];
+                if (compact) {
+                    if (i >= j)
+                        p->list[count++] = i;
+                    continue;
+                }
+                for (int q = mesh->neighbour_start[i]; q < mesh->neighbour_start[i + 1]; q++) {
+                    const int c = mesh->neighbour[q];
                     if (c >= j && p->mark[c] != j) {
                         p->mark[c] = j;
                         p->list[count++] = c;
@@ -140,119 +165,259 @@ static void pattern_build(silt_pressure *p, const silt_mesh *mesh) {
                         p->list[b + 1] = p->list[b];
                     p->list[b + 1] = key;
                 }
-                memcpy((int *)p->matrix->i + filled, p->list, (size_t)count * sizeof(int));
+                memcpy((int *)system->matrix->i + filled, p->list, (size_t)count * sizeof(int));
             }
             start[j] = filled;
             filled += count;
         }
         start[n] = filled;
         if (pass == 0)
-            p->matrix = cholmod_allocate_sparse((size_t)n, (size_t)n, (size_t)filled, 1, 1, -1, CHOLMOD_REAL, &p->common);
+            system->matrix = cholmod_allocate_sparse((size_t)n, (size_t)n, (size_t)filled, 1, 1, -1, CHOLMOD_REAL, &p->common);
     }
-    memcpy(p->matrix->p, start, ((size_t)n + 1) * sizeof *start);
+    memcpy(system->matrix->p, start, ((size_t)n + 1) * sizeof *start);
     free(start);
-    p->n = n;
-    pin_closed(p, mesh);
+    system->compact = compact;
+    system->revision = mesh->revision;
 }
 
-static void gradient_assemble(silt_pressure *p, const silt_fluid *fluid, const silt_mesh *mesh) {
-    memset(p->gradient, 0, (size_t)mesh->neighbour_start[mesh->n_node] * sizeof *p->gradient);
-    for (int e = 0; e < mesh->n_cell; e++)
-        for (int a = 0; a < 3; a++)
-            for (int b = 0; b < 3; b++)
-                for (int d = 0; d < 2; d++)
-                    p->gradient[p->place[9 * e + 3 * a + b]][d] +=
-                        fluid->area[e] * (fluid->grad[e][a][d] / 3 + fluid->share[e][a] * fluid->grad[e][b][d]);
+static void gradient_assemble(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh) {
+    const int D = f->dim, m = D + 1;
+    memset(p->gradient, 0, (size_t)(D * mesh->neighbour_start[mesh->n_node]) * sizeof *p->gradient);
+    for (int e = 0; e < mesh->n_cell; e++) {
+        const double *flux = f->flux + m * D * e;
+        for (int a = 0; a < m; a++)
+            for (int b = 0; b < m; b++)
+                for (int d = 0; d < D; d++)
+                    p->gradient[D * p->place[m * m * e + m * a + b] + d] +=
+                        flux[D * a + d] / m + (f->share ? f->share[m * e + a] * flux[D * b + d] : 0);
+    }
 }
 
 // one column of sum_i G_i^T P_i G_i / inertia_i
-static void column_consistent(silt_pressure *p, const silt_fluid *fluid, const silt_mesh *mesh, int j) {
+static void column_consistent(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh, int j) {
+    const int D = f->dim;
     for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
         const int i = mesh->neighbour[k];
-        if (fluid->hold[i] == 2)
+        if (f->hold[i] == HOLD_ALL)
             continue;
-        double g[2] = {p->gradient[p->mirror[k]][0], p->gradient[p->mirror[k]][1]};
-        if (fluid->hold[i] == 1) {
-            const double *n = fluid->normal + 2 * i, gn = g[0] * n[0] + g[1] * n[1];
-            g[0] -= gn * n[0];
-            g[1] -= gn * n[1];
-        }
-        g[0] /= fluid->inertia[i];
-        g[1] /= fluid->inertia[i];
+        double g[3];
+        memcpy(g, p->gradient + D * p->mirror[k], (size_t)D * sizeof(double));
+        silt_hold_project(f, i, g);
+        for (int d = 0; d < D; d++)
+            g[d] /= f->inertia[i];
         for (int m = mesh->neighbour_start[i]; m < mesh->neighbour_start[i + 1]; m++)
-            p->row[mesh->neighbour[m]] += g[0] * p->gradient[m][0] + g[1] * p->gradient[m][1];
+            for (int d = 0; d < D; d++)
+                p->row[mesh->neighbour[m]] += g[d] * p->gradient[D * m + d];
     }
 }
 
-silt_status silt_pressure_factor(silt_pressure *p, const silt_scene *scene, const silt_fluid *fluid,
-                                 const silt_nodes *nodes, const silt_mesh *mesh, silt_error *err) {
-    const bool fresh = p->revision != mesh->revision || !p->matrix;
-    if (fresh)
-        pattern_build(p, mesh);
-    gradient_assemble(p, fluid, mesh);
+// stabilisation, and with `inertial` the Laplacian in place of the consistent operator
+static void column_laplacian(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh, int j, bool inertial) {
+    const int D = f->dim;
+    for (int k = mesh->node_cell_start[j]; k < mesh->node_cell_start[j + 1]; k++) {
+        const int e = mesh->node_cell[k], *cell = mesh->cell[e];
+        const double *flux = f->flux + (D + 1) * D * e;
+        int a = 0;
+        while (cell[a] != j)
+            a++;
+        double weight = f->tau[e] * f->inverse[e];
+        if (inertial) {
+            double inertia = 0, volume = 0;
+            for (int c = 0; c <= D; c++) {
+                inertia += f->inertia[cell[c]];
+                volume += f->volume[cell[c]];
+            }
+            weight += f->inverse[e] * volume / inertia;
+        }
+        for (int c = 0; c <= D; c++)
+            for (int d = 0; d < D; d++)
+                p->row[cell[c]] += weight * flux[D * a + d] * flux[D * c + d];
+    }
+}
 
-    const bool consistent = scene->fluid.pressure == PRESSURE_CONSISTENT;
-    const int *start = p->matrix->p, *index = p->matrix->i;
-    double *value = p->matrix->x;
-    for (int j = 0; j < p->n; j++)
+// the compact matrix knows the free surface by this: G carries a constant pressure to nodes on the boundary only
+static void boundary_diagonal(silt_pressure *p, silt_fluid *f, const silt_mesh *mesh) {
+    const int D = f->dim;
+    double *normal = f->scratch;
+    memset(normal, 0, (size_t)(D * p->n) * sizeof(double));
+    for (int e = 0; e < mesh->n_cell; e++)
+        for (int a = 0; a <= D; a++)
+            for (int d = 0; d < D; d++)
+                normal[D * mesh->cell[e][a] + d] += f->flux[(D + 1) * D * e + D * a + d];
+    for (int i = 0; i < p->n; i++) {
+        silt_hold_project(f, i, normal + D * i);
+        double square = 0;
+        for (int d = 0; d < D; d++)
+            square += silt_square(normal[D * i + d]);
+        p->extra[i] = mesh->surface[i] ? square / f->inertia[i] : 0;
+    }
+}
+
+static silt_status system_factor(silt_pressure *p, silt_system *system, const silt_fluid *f, const silt_step *s, bool fresh, silt_error *err) {
+    if (fresh) {
+        cholmod_free_factor(&system->factor, &p->common);
+        system->factor = cholmod_analyze(system->matrix, &p->common);
+    }
+    cholmod_factor *factor = system->factor;
+    if (!factor || !cholmod_factorize(system->matrix, factor, &p->common) || p->common.status == CHOLMOD_NOT_POSDEF) {
+        const int bad = factor ? (int)factor->minor : 0;
+        const int node = factor && factor->Perm && bad < p->n ? ((int *)factor->Perm)[bad] : 0;
+        const double *x = s->nodes->x + f->dim * node;
+        system->revision = -1;
+        return silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite near (%g, %g)", x[0], x[1]);
+    }
+    return SILT_OK;
+}
+
+// 3/(4 mu) of the lumped mass and the stabilisation: what is left of the pressure's operator when viscosity outweighs inertia
+// (3/4: a gradient field meets 4/3 mu of the deviatoric stress)
+static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
+    const silt_mesh *mesh = s->mesh;
+    silt_system *system = &p->stiff;
+    const bool fresh = system->revision != mesh->revision || !system->matrix;
+    if (fresh)
+        pattern_build(p, system, mesh, f->dim, true);
+    double *fluidity = f->scratch;
+    memset(fluidity, 0, (size_t)p->n * sizeof(double));
+    for (int e = 0; e < mesh->n_cell; e++)
+        for (int a = 0; a <= f->dim; a++)
+            fluidity[mesh->cell[e][a]] += 0.75 * f->cell_volume[e] / ((f->dim + 1) * f->mu[e]);
+    const int *start = system->matrix->p, *index = system->matrix->i;
+    double *value = system->matrix->x;
+    memset(p->row, 0, (size_t)p->n * sizeof *p->row);
+    for (int j = 0; j < p->n; j++) {
+        column_laplacian(p, f, mesh, j, false);
+        p->row[j] += mesh->wet[j] ? fluidity[j] : 1;
+        for (int k = start[j]; k < start[j + 1]; k++)
+            value[k] = p->row[index[k]];
+        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
+            p->row[mesh->neighbour[k]] = 0;
         p->row[j] = 0;
+    }
+    return system_factor(p, system, f, s, fresh, err);
+}
+
+silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
+    const silt_mesh *mesh = s->mesh;
+    const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
+    const bool compact = f->dim == 3 || !consistent;
+    silt_system *system = &p->main;
+    const bool fresh = system->revision != mesh->revision || !system->matrix || system->compact != compact;
+    p->n = mesh->n_node;
+    if (fresh) {
+        pattern_build(p, system, mesh, f->dim, compact);
+        pin_closed(p, mesh);
+    }
+    SILT_RESERVE(p->extra, p->extra_capacity, p->n + 1);
+    memset(p->extra, 0, (size_t)p->n * sizeof *p->extra);
+    if (!compact)
+        gradient_assemble(p, f, mesh);
+    else if (consistent)
+        boundary_diagonal(p, f, mesh);
+
+    const int *start = system->matrix->p, *index = system->matrix->i;
+    double *value = system->matrix->x;
+    memset(p->row, 0, (size_t)p->n * sizeof *p->row);
     for (int j = 0; j < p->n; j++) {
         if (mesh->wet[j]) {
-            if (consistent)
-                column_consistent(p, fluid, mesh, j);
-            // stabilisation, and the Laplacian in place of the consistent operator
-            for (int k = mesh->node_cell_start[j]; k < mesh->node_cell_start[j + 1]; k++) {
-                const int e = mesh->node_cell[k], *cell = mesh->cell[e];
-                const int a = cell[0] == j ? 0 : cell[1] == j ? 1 : 2;
-                double weight = fluid->tau[e] * fluid->area[e];
-                if (!consistent) {
-                    double inertia = 0, volume = 0;
-                    for (int c = 0; c < 3; c++) {
-                        inertia += fluid->inertia[cell[c]];
-                        volume += fluid->volume[cell[c]];
-                    }
-                    weight += fluid->area[e] * volume / inertia;
-                }
-                for (int c = 0; c < 3; c++)
-                    p->row[cell[c]] += weight * (fluid->grad[e][a][0] * fluid->grad[e][c][0] + fluid->grad[e][a][1] * fluid->grad[e][c][1]);
-            }
+            if (!compact)
+                column_consistent(p, f, mesh, j);
+            column_laplacian(p, f, mesh, j, compact);
         }
+        p->row[j] += p->extra[j];
         double *diagonal = &value[start[j]];
         for (int k = start[j]; k < start[j + 1]; k++)
             value[k] = p->row[index[k]];
+        p->extra[j] = p->pinned[j] ? *diagonal : 1e-9 * *diagonal;
         if (!mesh->wet[j])
             *diagonal = 1;
         else
-            *diagonal *= p->pinned[j] ? 2 : 1 + 1e-9; // a crumb between held nodes knows its pressure up to a constant too
+            *diagonal += p->extra[j]; // a crumb between held nodes knows its pressure up to a constant too
         if (!consistent && mesh->surface[j]) // pressure increment prescribed on the free surface
             *diagonal += 1e12 * fabs(*diagonal);
         // clear what this column touched
         for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
             const int i = mesh->neighbour[k];
-            for (int m = mesh->neighbour_start[i]; m < mesh->neighbour_start[i + 1]; m++)
+            p->row[i] = 0;
+            for (int m = mesh->neighbour_start[i]; !compact && m < mesh->neighbour_start[i + 1]; m++)
                 p->row[mesh->neighbour[m]] = 0;
         }
+        p->row[j] = 0;
     }
-    if (fresh) {
-        cholmod_free_factor(&p->factor, &p->common);
-        p->factor = cholmod_analyze(p->matrix, &p->common);
-        p->revision = mesh->revision;
+    SILT_TRY(system_factor(p, system, f, s, fresh, err));
+    return stiff ? factor_stiff(p, f, s, err) : SILT_OK;
+}
+
+static silt_status factor_solve(silt_pressure *p, silt_system *system, const double *right, double *out, silt_error *err) {
+    cholmod_dense b = {.nrow = (size_t)p->n, .ncol = 1, .nzmax = (size_t)p->n, .d = (size_t)p->n, .x = (void *)(uintptr_t)right,
+                       .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
+    if (!cholmod_solve2(CHOLMOD_A, system->factor, &b, NULL, &p->solution, NULL, &p->work_y, &p->work_e, &p->common))
+        return silt_fail(err, SILT_FAILED, "the pressure system could not be solved (CHOLMOD status %d)", p->common.status);
+    memcpy(out, p->solution->x, (size_t)p->n * sizeof *out);
+    return SILT_OK;
+}
+
+// out = (G^T P G / inertia + L) x, without assembling it
+static void operator_apply(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh, const double *x, double *out) {
+    const int D = f->dim;
+    memset(p->work, 0, (size_t)(D * p->n) * sizeof(double));
+    silt_assemble_pressure(f, mesh, x, p->work, NULL);
+    for (int i = 0; i < p->n; i++) {
+        silt_hold_project(f, i, p->work + D * i);
+        for (int d = 0; d < D; d++)
+            p->work[D * i + d] /= f->inertia[i];
     }
-    if (!p->factor || !cholmod_factorize(p->matrix, p->factor, &p->common) || p->common.status == CHOLMOD_NOT_POSDEF) {
-        const int bad = p->factor ? (int)p->factor->minor : 0;
-        const int node = p->factor && p->factor->Perm && bad < p->n ? ((int *)p->factor->Perm)[bad] : 0;
-        p->revision = -1;
-        return silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite near (%g, %g)", nodes->x[2 * node],
-                         nodes->x[2 * node + 1]);
+    silt_assemble_divergence(f, mesh, p->work, x, out);
+    for (int i = 0; i < p->n; i++)
+        out[i] = mesh->wet[i] ? out[i] + p->extra[i] * x[i] : x[i];
+}
+
+static double dot(int n, const double *a, const double *b) {
+    double sum = 0;
+    for (int i = 0; i < n; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
+#define CG_LIMIT 400
+
+silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step *s, const double *right, double tolerance,
+                                double *x, silt_error *err) {
+    const int n = p->n;
+    if (!p->main.compact || s->scene->fluid.pressure != PRESSURE_CONSISTENT)
+        return factor_solve(p, &p->main, right, x, err);
+    for (int k = 0; k < 4; k++)
+        SILT_RESERVE(p->cg[k], p->cg_capacity[k], n + 1);
+    SILT_RESERVE(p->work, p->work_capacity, f->dim * n + 1);
+    double *r = p->cg[0], *z = p->cg[1], *d = p->cg[2], *ad = p->cg[3];
+    memcpy(r, right, (size_t)n * sizeof *r);
+    memset(x, 0, (size_t)n * sizeof *x);
+    SILT_TRY(factor_solve(p, &p->main, r, z, err));
+    memcpy(d, z, (size_t)n * sizeof *d);
+    double rz = dot(n, r, z);
+    const double target = silt_square(tolerance) * rz;
+    for (int k = 0; rz > target && rz > 0; k++) {
+        if (k == CG_LIMIT)
+            return silt_fail(err, SILT_FAILED, "the pressure system did not converge in %d iterations (%d nodes)", CG_LIMIT, n);
+        operator_apply(p, f, s->mesh, d, ad);
+        const double curvature = dot(n, d, ad);
+        if (!(curvature > 0))
+            return silt_fail(err, SILT_FAILED, "the pressure operator is not positive definite (%d nodes)", n);
+        const double alpha = rz / curvature;
+        for (int i = 0; i < n; i++) {
+            x[i] += alpha * d[i];
+            r[i] -= alpha * ad[i];
+        }
+        SILT_TRY(factor_solve(p, &p->main, r, z, err));
+        const double fresh = dot(n, r, z), beta = fresh / rz;
+        for (int i = 0; i < n; i++)
+            d[i] = z[i] + beta * d[i];
+        rz = fresh;
+        f->pressure_iterations++;
     }
     return SILT_OK;
 }
 
-silt_status silt_pressure_solve(silt_pressure *p, const double *right, double *increment, silt_error *err) {
-    cholmod_dense b = {.nrow = (size_t)p->n, .ncol = 1, .nzmax = (size_t)p->n, .d = (size_t)p->n, .x = (void *)(uintptr_t)right,
-                       .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
-    if (!cholmod_solve2(CHOLMOD_A, p->factor, &b, NULL, &p->solution, NULL, &p->work_y, &p->work_e, &p->common))
-        return silt_fail(err, SILT_FAILED, "the pressure system could not be solved (CHOLMOD status %d)", p->common.status);
-    memcpy(increment, p->solution->x, (size_t)p->n * sizeof *increment);
-    return SILT_OK;
+silt_status silt_pressure_solve_stiff(silt_pressure *p, const double *right, double *increment, silt_error *err) {
+    return factor_solve(p, &p->stiff, right, increment, err);
 }

@@ -1,11 +1,19 @@
-// the cloud's density: crowded nodes leave, stretched edges get a node; each change locks its surroundings for the step
+// the cloud's density: crowded nodes leave, stretched places get nodes
 #include "pfem.h"
 
+/* Lengths are held against h, the mean of the local sizes of both ends. Candidates are taken in the order of how far off they
+ * are, never of their numbers. A node leaves with its surroundings locked for the step; a node comes only where it has room,
+ * and the room it needs is more than what it takes to be crowded: what came does not leave again. */
 #define REFINE_CROWDED 0.5  // edges shorter than this times h lose a node; on the surface
-#define REFINE_SURFACE 0.35 // this: the surface's shape hangs on them
+#define REFINE_SURFACE 0.35 // this: the surface's shape hangs on them; up to the former where the surface is so flat that
+#define REFINE_SHAPE 0.01   // less than this times h^dim comes or goes with the node
 #define REFINE_FLAT 0.25    // a node nearer to a wall than this times h is pressed out
-#define REFINE_LONG 1.5     // edges longer than this times h get a node
-#define REFINE_FILM 0.25    // cells smaller than this times h^2 are films: they break rather than fill with nodes
+#define REFINE_LONG 1.5     // edges longer than this times h get nodes
+#define REFINE_ROOM 0.6     // but none nearer than this times h to another; on the boundary
+#define REFINE_RIM 0.36     // this: an edge of the surface that is not split tears, what is crowded by its node leaves
+#define REFINE_PIECES 4     // into which an edge is split at most
+// cells smaller than this times h^dim are films: they break rather than fill with nodes
+static const double refine_film[4] = {0, 0, 0.25, 0.068};
 
 void silt_memory_clear(silt_memory *memory) {
     free(memory->cell);
@@ -26,6 +34,13 @@ void silt_memory_extend(silt_memory *memory, int n_node) {
     for (int i = memory->n_node; i < n_node; i++)
         memory->interior[i] = memory->dead[i] = 0;
     memory->n_node = n_node;
+}
+
+static double cell_measure(const silt_mesh *mesh, const double *x, const int *cell) {
+    if (mesh->dim != 3 && mesh->period[0] == 0)
+        return silt_cell_area(x, cell);
+    const silt_mesh one = {.dim = mesh->dim, .period = {mesh->period[0], mesh->period[1], mesh->period[2]}, .cell = (int(*)[4])cell};
+    return silt_cell_volume(&one, x, 0);
 }
 
 void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nodes *nodes) {
@@ -49,26 +64,51 @@ void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nod
         memory->interior[i] = i < mesh->n_node && mesh->wet[i] && !mesh->surface[i];
 }
 
+typedef struct candidate {
+    double key;     // how far from what it should be: the largest first
+    int a, b, cell; // edge, or node and -1
+} candidate;
+
 typedef struct refinement {
     const silt_mesh *mesh;
     silt_nodes *nodes;
     silt_memory *memory;
+    const silt_walls *walls;
+    int dim;
+    double h; // fluid.size
     uint8_t *locked;
-    double h;
+    int *facet_start, *facet; // boundary facets of every node
+    candidate *list;
+    int n, capacity;
+    int *fresh, *fresh_next; // nodes added in this step by the nodes around them: first of a list, next
+    int *fresh_node;
+    int n_fresh, fresh_next_capacity, fresh_node_capacity;
 } refinement;
+
+static double refine_h(const refinement *r, int a, int b) {
+    return r->nodes->h ? 0.5 * (silt_node_h(r->nodes, a, r->h) + silt_node_h(r->nodes, b, r->h)) : r->h;
+}
+
+// from a to a point, the shortest way
+static double refine_apart(const refinement *r, int a, const double *to, double d[3]) {
+    const double *x = r->nodes->x + r->dim * a;
+    d[2] = 0;
+    for (int c = 0; c < r->dim; c++) {
+        d[c] = to[c] - x[c];
+        if (r->mesh->period[c] > 0)
+            d[c] -= r->mesh->period[c] * floor(d[c] / r->mesh->period[c] + 0.5);
+    }
+    return r->dim == 3 ? sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) : hypot(d[0], d[1]);
+}
+
+static double refine_length(const refinement *r, int a, int b) {
+    double d[3];
+    return refine_apart(r, a, r->nodes->x + r->dim * b, d);
+}
 
 static void refine_lock(refinement *r, int i) {
     for (int k = r->mesh->neighbour_start[i]; k < r->mesh->neighbour_start[i + 1]; k++)
         r->locked[r->mesh->neighbour[k]] = 1;
-}
-
-// how dear a node is: the dearer of two crowded ones stays
-static int refine_rank(const refinement *r, int i) {
-    if (r->nodes->kind[i] != NODE_FLUID)
-        return 9;
-    if (r->nodes->wall[i][1] >= 0)
-        return 8; // fills a corner
-    return (r->mesh->surface[i] ? 2 : 0) + (r->nodes->wall[i][0] >= 0 ? 1 : 0);
 }
 
 static void refine_remove(refinement *r, int i) {
@@ -76,114 +116,479 @@ static void refine_remove(refinement *r, int i) {
     refine_lock(r, i);
 }
 
+// how dear a node is: the dearer of two crowded ones stays; from 8 on none leaves
+static int refine_rank(const refinement *r, int i) {
+    if (r->nodes->kind[i] != NODE_FLUID)
+        return 9;
+    int n_wall = 0;
+    for (int s = 0; s < 3; s++)
+        n_wall += r->nodes->wall[i][s] >= 0;
+    if (n_wall >= r->dim)
+        return 8; // fills a corner
+    return (n_wall == 2 ? 4 : n_wall) + (r->mesh->surface[i] ? 2 : 0);
+}
+
+static void refine_propose(refinement *r, double key, int a, int b, int cell) {
+    SILT_RESERVE(r->list, r->capacity, r->n + 1);
+    r->list[r->n++] = (candidate){key, a, b, cell};
+}
+
+static int candidate_order(const void *p, const void *q) {
+    const candidate *a = p, *b = q;
+    if (a->key != b->key)
+        return a->key > b->key ? -1 : 1;
+    if (a->a != b->a)
+        return a->a - b->a;
+    return a->b != b->b ? a->b - b->b : a->cell - b->cell;
+}
+
+static void refine_sort(refinement *r) {
+    if (r->n > 1)
+        qsort(r->list, (size_t)r->n, sizeof *r->list, candidate_order);
+}
+
+static void refine_facets(refinement *r) {
+    const silt_mesh *mesh = r->mesh;
+    r->facet_start = silt_alloc((size_t)mesh->n_node + 2, sizeof *r->facet_start);
+    r->facet = silt_alloc((size_t)(3 * mesh->n_facet) + 1, sizeof *r->facet);
+    for (int pass = 0; pass < 2; pass++) {
+        for (int k = 0; k < mesh->n_facet; k++)
+            for (int a = 0; a < r->dim; a++) {
+                int *start = &r->facet_start[mesh->facet[k][a]];
+                if (pass == 0)
+                    ++*start;
+                else
+                    r->facet[--*start] = k;
+            }
+        for (int i = 0, sum = 0; pass == 0 && i <= mesh->n_node; i++)
+            r->facet_start[i] = sum += i < mesh->n_node ? r->facet_start[i] : 0;
+    }
+}
+
+// m2 or m3 between the surface with node i and without: the fan of its free facets over the middle of their rim
+static double refine_shape(const refinement *r, int i) {
+    const silt_mesh *mesh = r->mesh;
+    double middle[3] = {0}, sum = 0, d[3], e[3];
+    int n = 0;
+    for (int k = r->facet_start[i]; k < r->facet_start[i + 1]; k++)
+        for (int a = 0; a < r->dim; a++) {
+            const int j = mesh->facet[r->facet[k]][a];
+            if (j == i || mesh->facet_kind[r->facet[k]] != FACET_FREE)
+                continue;
+            refine_apart(r, i, r->nodes->x + r->dim * j, d);
+            for (int c = 0; c < 3; c++)
+                middle[c] += d[c];
+            n++;
+        }
+    if (n < 2)
+        return HUGE_VAL;
+    for (int c = 0; c < 3; c++)
+        middle[c] /= n;
+    for (int k = r->facet_start[i]; k < r->facet_start[i + 1]; k++) {
+        const int *facet = mesh->facet[r->facet[k]];
+        if (mesh->facet_kind[r->facet[k]] != FACET_FREE)
+            continue;
+        const int at = facet[0] == i ? 0 : facet[1] == i ? 1 : 2, other = facet[(at + 1) % r->dim];
+        refine_apart(r, i, r->nodes->x + r->dim * other, d);
+        if (r->dim == 2) {
+            sum += (at == 0 ? 0.5 : -0.5) * (d[0] * middle[1] - d[1] * middle[0]);
+            continue;
+        }
+        refine_apart(r, i, r->nodes->x + 3 * facet[(at + 2) % 3], e);
+        sum += (d[0] * (e[1] * middle[2] - e[2] * middle[1]) + d[1] * (e[2] * middle[0] - e[0] * middle[2]) +
+                d[2] * (e[0] * middle[1] - e[1] * middle[0])) / 6;
+    }
+    return fabs(sum);
+}
+
+// how far the farthest node is that has to be joined to `stays` when `goes` leaves
+static double refine_stretch(const refinement *r, int goes, int stays) {
+    double most = 0;
+    for (int k = r->mesh->neighbour_start[goes]; k < r->mesh->neighbour_start[goes + 1]; k++)
+        if (r->mesh->neighbour[k] != goes)
+            most = silt_max(most, refine_length(r, stays, r->mesh->neighbour[k]));
+    return most;
+}
+
 static void refine_crowded(refinement *r) {
-    const double *x = r->nodes->x;
-    for (int i = 0; i < r->mesh->n_node; i++)
-        for (int k = r->mesh->neighbour_start[i]; k < r->mesh->neighbour_start[i + 1]; k++) {
-            const int j = r->mesh->neighbour[k];
+    const silt_mesh *mesh = r->mesh;
+    r->n = 0;
+    for (int i = 0; i < mesh->n_node; i++)
+        for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++) {
+            const int j = mesh->neighbour[k];
             if (j <= i || r->locked[i] || r->locked[j])
                 continue;
-            const double length = hypot(x[2 * j] - x[2 * i], x[2 * j + 1] - x[2 * i + 1]);
-            const int ri = refine_rank(r, i), rj = refine_rank(r, j);
-            const bool both_surface = r->mesh->surface[i] && r->mesh->surface[j];
-            if (length >= (both_surface ? REFINE_SURFACE : REFINE_CROWDED) * r->h)
-                continue;
-            // the less dear one goes; of equals the younger
-            const int goes = ri != rj ? (ri < rj ? i : j) : r->nodes->id[i] > r->nodes->id[j] ? i : j;
-            if (refine_rank(r, goes) < 8)
-                refine_remove(r, goes);
+            const double ratio = refine_length(r, i, j) / refine_h(r, i, j);
+            if (ratio < REFINE_CROWDED)
+                refine_propose(r, -ratio, i, j, -1);
         }
+    refine_sort(r);
+    for (int c = 0; c < r->n; c++) {
+        const int i = r->list[c].a, j = r->list[c].b;
+        if (r->locked[i] || r->locked[j])
+            continue;
+        const int ri = refine_rank(r, i), rj = refine_rank(r, j);
+        if (ri >= 8 && rj >= 8)
+            continue;
+        // the less dear one goes; of equals the one that changes least; of those the younger
+        const bool both_surface = mesh->surface[i] && mesh->surface[j];
+        int goes = ri < rj ? i : j;
+        if (ri == rj) {
+            const double ci = both_surface ? refine_shape(r, i) : refine_stretch(r, i, j);
+            const double cj = both_surface ? refine_shape(r, j) : refine_stretch(r, j, i);
+            goes = ci != cj ? (ci < cj ? i : j) : r->nodes->id[i] > r->nodes->id[j] ? i : j;
+        }
+        if (both_surface && -r->list[c].key >= REFINE_SURFACE &&
+            refine_shape(r, goes) >= REFINE_SHAPE * pow(refine_h(r, i, j), r->dim))
+            continue;
+        refine_remove(r, goes);
+    }
+}
+
+// the cell behind a boundary facet, and its node that the facet lacks
+static int refine_behind(const refinement *r, int k, int *apex) {
+    const int *facet = r->mesh->facet[k];
+    for (int m = r->mesh->node_cell_start[facet[0]]; m < r->mesh->node_cell_start[facet[0] + 1]; m++) {
+        const int *cell = r->mesh->cell[r->mesh->node_cell[m]];
+        int found = 0;
+        *apex = -1;
+        for (int c = 0; c <= r->dim; c++) {
+            bool in = false;
+            for (int a = 0; a < r->dim; a++)
+                in |= cell[c] == facet[a];
+            found += in;
+            *apex = in ? *apex : cell[c];
+        }
+        if (found == r->dim)
+            return r->mesh->node_cell[m];
+    }
+    return -1;
+}
+
+// m or m2 of a facet
+static double refine_facet_measure(const refinement *r, const int *facet) {
+    double d[3], e[3];
+    const double length = refine_apart(r, facet[0], r->nodes->x + r->dim * facet[1], d);
+    if (r->dim == 2)
+        return length;
+    refine_apart(r, facet[0], r->nodes->x + 3 * facet[2], e);
+    const double n[3] = {d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]};
+    return 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
 }
 
 // inner nodes pressed against a wall, the bed or a body
 static void refine_flat(refinement *r) {
-    const double *x = r->nodes->x;
+    r->n = 0;
     for (int k = 0; k < r->mesh->n_facet; k++) {
         if (r->mesh->facet_kind[k] == FACET_FREE || r->mesh->facet_kind[k] == FACET_INLET)
             continue;
-        const int a = r->mesh->facet[k][0], b = r->mesh->facet[k][1];
-        for (int m = r->mesh->node_cell_start[a]; m < r->mesh->node_cell_start[a + 1]; m++) {
-            const int *cell = r->mesh->cell[r->mesh->node_cell[m]];
-            int third = -1;
-            for (int c = 0; c < 3; c++)
-                if (cell[c] == a && cell[(c + 1) % 3] == b)
-                    third = cell[(c + 2) % 3];
-            if (third < 0 || r->locked[third] || refine_rank(r, third) != 0)
-                continue;
-            const double length = hypot(x[2 * b] - x[2 * a], x[2 * b + 1] - x[2 * a + 1]);
-            if (2 * silt_cell_area(x, cell) < REFINE_FLAT * r->h * length)
-                refine_remove(r, third);
-        }
+        int apex;
+        const int e = refine_behind(r, k, &apex);
+        if (e < 0 || r->locked[apex] || refine_rank(r, apex) != 0)
+            continue;
+        const int *facet = r->mesh->facet[k];
+        const double height = r->dim * cell_measure(r->mesh, r->nodes->x, r->mesh->cell[e]) / refine_facet_measure(r, facet);
+        const double ratio = height / silt_node_h(r->nodes, apex, r->h);
+        if (ratio < REFINE_FLAT)
+            refine_propose(r, -ratio, apex, -1, e);
     }
+    refine_sort(r);
+    for (int c = 0; c < r->n; c++)
+        if (!r->locked[r->list[c].a])
+            refine_remove(r, r->list[c].a);
 }
 
-static bool refine_may_split(const refinement *r, int a, int b, int wall[2]) {
+// cells around the edge a-b; *closed: no boundary facet has the edge
+static int refine_around(const refinement *r, int a, int b, int room, int *around, bool *closed) {
+    int n = 0, n_other = 0, other[64];
+    *closed = true;
+    for (int k = r->mesh->node_cell_start[a]; k < r->mesh->node_cell_start[a + 1] && n < room; k++) {
+        const int *cell = r->mesh->cell[r->mesh->node_cell[k]];
+        bool has = false;
+        for (int c = 0; c <= r->dim; c++)
+            has |= cell[c] == b;
+        if (!has)
+            continue;
+        around[n++] = r->mesh->node_cell[k];
+        for (int c = 0; c <= r->dim; c++) {
+            int known = 0;
+            while (known < n_other && other[known] != cell[c])
+                known++;
+            if (cell[c] != a && cell[c] != b && known == n_other && n_other < 64)
+                other[n_other++] = cell[c];
+        }
+    }
+    // a ring of tetrahedra has as many nodes as cells, a fan one more; an inner edge of the plane has two triangles
+    *closed = r->dim == 3 ? n_other == n : n == 2;
+    return n;
+}
+
+// true when a node with another owner than a wall (corner, bed, inlet) stands on the element's plane
+static bool refine_stands_on(const refinement *r, int i, int element) {
+    const silt_walls *walls = r->walls;
+    if (r->nodes->kind[i] == NODE_FLUID || !walls || element >= walls->count)
+        return false;
+    const double *at = r->dim == 3 ? walls->corner[element][0] : walls->from[element], *n = walls->normal[element];
+    double off = 0;
+    for (int d = 0; d < r->dim; d++)
+        off += (r->nodes->x[r->dim * i + d] - at[d]) * n[d];
+    return fabs(off) < 1e-3 * r->h;
+}
+
+// Walls that both ends of an edge lie on. @return how many
+static int refine_walls(const refinement *r, int a, int b, int wall[3]) {
     const silt_nodes *nodes = r->nodes;
-    const silt_node_kind ka = nodes->kind[a], kb = nodes->kind[b];
-    wall[0] = wall[1] = -1;
-    if (ka != NODE_FLUID && kb != NODE_FLUID && ka == kb)
-        return false; // bed, body and inlet keep their own nodes
-    for (int s = 0; s < 2; s++)
-        for (int t = 0; t < 2; t++)
-            if (nodes->wall[a][s] >= 0 && nodes->wall[a][s] == nodes->wall[b][t])
-                wall[0] = nodes->wall[a][s];
+    int n = 0;
+    wall[0] = wall[1] = wall[2] = -1;
+    for (int s = 0; s < 3; s++)
+        for (int t = 0; t < 3 && nodes->wall[a][s] >= 0; t++) {
+            const int w = nodes->wall[a][s], o = nodes->wall[b][t];
+            const bool same = w == o || (o >= 0 && r->walls && w < r->walls->count && o < r->walls->count &&
+                                         r->walls->patch[w] == r->walls->patch[o]);
+            if (same && n < 3 && (n == 0 || wall[n - 1] != w))
+                wall[n++] = w;
+        }
+    for (int s = 0; s < 3 && n == 0; s++)
+        for (int end = 0; end < 2 && n == 0; end++) {
+            const int w = nodes->wall[end ? b : a][s];
+            if (w >= 0 && refine_stands_on(r, end ? a : b, w))
+                wall[n++] = w;
+        }
+    return n;
+}
+
+// puts a point onto the walls that it shall lie on: the nearest element of the patch, then its plane
+static void refine_onto(const refinement *r, int n, int wall[3], double *x) {
+    const silt_walls *walls = r->walls;
+    if (!walls || !walls->count)
+        return;
+    for (int s = 0; s < n; s++) {
+        int element;
+        silt_walls_distance(walls, x, &element);
+        if (element >= 0 && n == 1 && walls->patch[element] == walls->patch[wall[s]])
+            wall[s] = element;
+    }
+    // alternating projections; planes of a crease meet within a few
+    for (int sweep = 0; sweep < (n > 1 ? 20 : 1); sweep++)
+        for (int s = 0; s < n; s++) {
+            const double *at = r->dim == 3 ? walls->corner[wall[s]][0] : walls->from[wall[s]], *normal = walls->normal[wall[s]];
+            double off = 0;
+            for (int d = 0; d < r->dim; d++)
+                off += (x[d] - at[d]) * normal[d];
+            for (int d = 0; d < r->dim && fabs(off) > 1e-12 * r->h; d++)
+                x[d] -= off * normal[d];
+        }
+}
+
+// true when no node, new ones included, is nearer to x than room; a and b: ends of the edge that x lies on
+static bool refine_has_room(const refinement *r, int a, int b, const double *x, double room) {
+    double d[3];
+    for (int end = 0; end < 2; end++) {
+        const int i = end ? b : a;
+        for (int k = r->mesh->neighbour_start[i]; k < r->mesh->neighbour_start[i + 1]; k++) {
+            const int j = r->mesh->neighbour[k];
+            if (j != a && j != b && !r->memory->dead[j] && refine_apart(r, j, x, d) < room)
+                return false;
+            for (int m = r->fresh[j]; m >= 0; m = r->fresh_next[m])
+                if (refine_apart(r, r->fresh_node[m], x, d) < room)
+                    return false;
+        }
+    }
     return true;
 }
 
-static void refine_stretched(refinement *r) {
+static void refine_insert(refinement *r, int a, int b, double share, bool closed, const int *around, int n_around) {
     silt_nodes *nodes = r->nodes;
+    const int dim = r->dim;
+    double d[3], x[3] = {0};
+    int wall[3];
+    refine_apart(r, a, nodes->x + dim * b, d);
+    for (int c = 0; c < dim; c++)
+        x[c] = nodes->x[dim * a + c] + share * d[c];
+    // on a wall only along its surface, not on edges that bridge the water in a corner
+    const int n_wall = closed ? 0 : refine_walls(r, a, b, wall);
+    if (n_wall)
+        refine_onto(r, n_wall, wall, x);
+    const double h = refine_h(r, a, b);
+    if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : REFINE_RIM) * h))
+        return;
+    const int i = silt_nodes_add(nodes, NODE_FLUID, -1, x);
+    for (int c = 0; c < dim; c++)
+        nodes->v[dim * i + c] = (1 - share) * nodes->v[dim * a + c] + share * nodes->v[dim * b + c];
+    nodes->p[i] = (1 - share) * nodes->p[a] + share * nodes->p[b];
+    if (nodes->h)
+        nodes->h[i] = (1 - share) * silt_node_h(nodes, a, r->h) + share * silt_node_h(nodes, b, r->h);
+    for (int s = 0; s < n_wall; s++)
+        nodes->wall[i][s] = wall[s];
+    silt_memory_extend(r->memory, nodes->count);
+    r->memory->interior[i] = closed;
+    for (int k = 0; k < n_around; k++)
+        for (int c = 0; c <= dim; c++) {
+            const int j = r->mesh->cell[around[k]][c];
+            SILT_RESERVE(r->fresh_next, r->fresh_next_capacity, r->n_fresh + 1);
+            SILT_RESERVE(r->fresh_node, r->fresh_node_capacity, r->n_fresh + 1);
+            r->fresh_next[r->n_fresh] = r->fresh[j];
+            r->fresh_node[r->n_fresh] = i;
+            r->fresh[j] = r->n_fresh++;
+        }
+}
+
+static void refine_stretched(refinement *r) {
+    const silt_nodes *nodes = r->nodes;
+    const int dim = r->dim;
+    r->n = 0;
     for (int e = 0; e < r->mesh->n_cell; e++) {
         const int *cell = r->mesh->cell[e];
-        if (r->locked[cell[0]] || r->locked[cell[1]] || r->locked[cell[2]])
-            continue;
-        int longest = 0;
-        double length = 0;
-        for (int a = 0; a < 3; a++) {
-            const double *p = nodes->x + 2 * cell[a], *q = nodes->x + 2 * cell[(a + 1) % 3];
-            const double l = hypot(q[0] - p[0], q[1] - p[1]);
-            if (l > length) {
-                length = l;
-                longest = a;
+        bool locked = false;
+        double most = 0;
+        int a = -1, b = -1;
+        for (int s = 0; s <= dim; s++) {
+            locked |= r->locked[cell[s]];
+            for (int t = s + 1; t <= dim; t++) {
+                const double ratio = refine_length(r, cell[s], cell[t]) / refine_h(r, cell[s], cell[t]);
+                if (ratio > most) {
+                    most = ratio;
+                    a = cell[s];
+                    b = cell[t];
+                }
             }
         }
-        const int a = cell[longest], b = cell[(longest + 1) % 3];
-        int wall[2];
-        if (length < REFINE_LONG * r->h || silt_cell_area(nodes->x, cell) < REFINE_FILM * r->h * r->h ||
-            !refine_may_split(r, a, b, wall))
+        if (locked || most < REFINE_LONG)
             continue;
-        const double middle[2] = {0.5 * (nodes->x[2 * a] + nodes->x[2 * b]), 0.5 * (nodes->x[2 * a + 1] + nodes->x[2 * b + 1])};
-        const int i = silt_nodes_add(nodes, NODE_FLUID, -1, middle);
-        for (int d = 0; d < 2; d++) {
-            nodes->v[2 * i + d] = 0.5 * (nodes->v[2 * a + d] + nodes->v[2 * b + d]);
-            nodes->wall[i][d] = wall[d];
-        }
-        nodes->p[i] = 0.5 * (nodes->p[a] + nodes->p[b]);
-        silt_memory_extend(r->memory, nodes->count);
-        // inside unless it sits on a boundary edge
-        bool boundary = wall[0] >= 0;
-        for (int k = 0; k < r->mesh->n_facet && !boundary; k++)
-            boundary = r->mesh->facet[k][0] == a && r->mesh->facet[k][1] == b;
-        r->memory->interior[i] = !boundary;
-        for (int c = 0; c < 3; c++)
-            r->locked[cell[c]] = 1;
-        for (int k = r->mesh->node_cell_start[a]; k < r->mesh->node_cell_start[a + 1]; k++) {
-            const int *other = r->mesh->cell[r->mesh->node_cell[k]];
-            if (other[0] == b || other[1] == b || other[2] == b)
-                for (int c = 0; c < 3; c++)
-                    r->locked[other[c]] = 1;
-        }
+        // bed, bodies and inlets keep their own nodes
+        if (nodes->kind[a] != NODE_FLUID && nodes->kind[a] == nodes->kind[b])
+            continue;
+        if (cell_measure(r->mesh, nodes->x, cell) >= refine_film[dim] * pow(refine_h(r, a, b), dim))
+            refine_propose(r, most, a < b ? a : b, a < b ? b : a, e);
     }
+    refine_sort(r);
+    r->fresh = silt_alloc((size_t)r->mesh->n_node + 1, sizeof *r->fresh);
+    for (int i = 0; i < r->mesh->n_node; i++)
+        r->fresh[i] = -1;
+    for (int c = 0; c < r->n; c++) {
+        const int a = r->list[c].a, b = r->list[c].b;
+        if (c && r->list[c - 1].a == a && r->list[c - 1].b == b)
+            continue;
+        int around[64];
+        bool closed, locked = false;
+        const int n_around = refine_around(r, a, b, 64, around, &closed);
+        for (int k = 0; k < n_around; k++)
+            for (int s = 0; s <= dim; s++)
+                locked |= r->locked[r->mesh->cell[around[k]][s]];
+        if (locked)
+            continue;
+        const int pieces = (int)silt_clamp(floor(r->list[c].key + 0.5), 2, REFINE_PIECES);
+        for (int m = 1; m < pieces; m++)
+            refine_insert(r, a, b, (double)m / pieces, closed, around, n_around);
+    }
+    free(r->fresh);
+    free(r->fresh_next);
+    free(r->fresh_node);
 }
 
 void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h) {
-    if (silt_nodes_dim(nodes) == 3)
-        return; // the rules above are those of the plane
-    refinement r = {.mesh = mesh, .nodes = nodes, .memory = memory, .h = h};
+    refinement r = {.mesh = mesh, .nodes = nodes, .memory = memory, .walls = mesh->walls, .dim = silt_nodes_dim(nodes), .h = h};
     r.locked = silt_alloc((size_t)mesh->n_node + 1, 1);
     for (int i = 0; i < mesh->n_node; i++)
         r.locked[i] = memory->dead[i];
+    refine_facets(&r);
     refine_crowded(&r);
     refine_flat(&r);
     refine_stretched(&r);
+    free(r.facet_start);
+    free(r.facet);
+    free(r.list);
     free(r.locked);
+}
+
+// ---- a test of remeshing
+
+// gradient of field number `of` at a node: the mean over its cells by volume; values holds `width` numbers per node
+static void shuffle_gradient(const silt_mesh *mesh, int dim, const double *x, int i, int width, const double *const *value,
+                             double gradient[4][3]) {
+    double total = 0;
+    memset(gradient, 0, 4 * sizeof *gradient);
+    for (int k = mesh->node_cell_start[i]; k < mesh->node_cell_start[i + 1]; k++) {
+        const int *cell = mesh->cell[mesh->node_cell[k]];
+        double c[12], g[4][3] = {{0}};
+        silt_cell_corners(mesh, x, cell, c);
+        const double volume = cell_measure(mesh, x, cell), part = dim == 3 ? 6 : 2;
+        // volume times the gradient of each corner's shape function
+        for (int a = 0; a <= dim; a++) {
+            const double *p = c + dim * ((a + 1) % (dim + 1)), *q = c + dim * ((a + 2) % (dim + 1));
+            if (dim == 2) {
+                g[a][0] = (p[1] - q[1]) / part;
+                g[a][1] = (q[0] - p[0]) / part;
+                continue;
+            }
+            const double *s = c + 3 * ((a + 3) % 4), sign = a % 2 ? 1 : -1;
+            double u[3], w[3];
+            for (int d = 0; d < 3; d++) {
+                u[d] = q[d] - p[d];
+                w[d] = s[d] - p[d];
+            }
+            for (int d = 0; d < 3; d++)
+                g[a][d] = sign * (u[(d + 1) % 3] * w[(d + 2) % 3] - u[(d + 2) % 3] * w[(d + 1) % 3]) / part;
+        }
+        for (int f = 0; f < width; f++)
+            for (int a = 0; a <= dim; a++)
+                for (int d = 0; d < dim; d++)
+                    gradient[f][d] += g[a][d] * (f ? value[1][dim * cell[a] + f - 1] : value[0][cell[a]]);
+        total += volume;
+    }
+    for (int f = 0; f < width; f++)
+        for (int d = 0; d < dim; d++)
+            gradient[f][d] /= total;
+}
+
+// smallest ratio of a cell's volume with node i at `to` to what it was
+static double shuffle_squeeze(const silt_mesh *mesh, int dim, const double *x, int i, const double *step) {
+    double least = 1;
+    for (int k = mesh->node_cell_start[i]; k < mesh->node_cell_start[i + 1]; k++) {
+        const int *cell = mesh->cell[mesh->node_cell[k]];
+        static const int plain[4] = {0, 1, 2, 3};
+        const silt_mesh alone = {.dim = dim};
+        double c[12];
+        silt_cell_corners(mesh, x, cell, c);
+        const double before = cell_measure(&alone, c, plain);
+        for (int a = 0; a <= dim; a++)
+            for (int d = 0; d < dim && cell[a] == i; d++)
+                c[dim * a + d] += step[d];
+        least = silt_min(least, cell_measure(&alone, c, plain) / before);
+    }
+    return least;
+}
+
+void silt_nodes_shuffle(silt_nodes *nodes, const silt_mesh *mesh, const silt_scene *scene, int64_t step) {
+    const int dim = silt_nodes_dim(nodes), n = nodes->count;
+    if (scene->fluid.shuffle <= 0)
+        return;
+    double *shift = silt_alloc((size_t)(3 * n) + 1, sizeof *shift), *change = silt_alloc((size_t)(4 * n) + 1, sizeof *change);
+    const double *const value[2] = {nodes->p, nodes->v};
+    for (int i = 0; i < n; i++) {
+        if (i >= mesh->n_node || !mesh->wet[i] || mesh->surface[i] || nodes->kind[i] != NODE_FLUID || nodes->wall[i][0] >= 0)
+            continue;
+        uint64_t random = silt_hash(0, &scene->fluid.seed, sizeof scene->fluid.seed);
+        random = silt_hash(silt_hash(random, &step, sizeof step), &nodes->id[i], sizeof nodes->id[i]);
+        for (int d = 0; d < dim; d++)
+            shift[3 * i + d] = scene->fluid.shuffle * silt_node_h(nodes, i, scene->fluid.size) * (2 * silt_uniform(&random) - 1);
+        // no cell may be crushed
+        for (int tries = 0; tries < 8 && shuffle_squeeze(mesh, dim, nodes->x, i, shift + 3 * i) < 0.3; tries++)
+            for (int d = 0; d < dim; d++)
+                shift[3 * i + d] *= 0.5;
+        double gradient[4][3];
+        shuffle_gradient(mesh, dim, nodes->x, i, dim + 1, value, gradient);
+        for (int f = 0; f <= dim; f++)
+            for (int d = 0; d < dim; d++)
+                change[4 * i + f] += gradient[f][d] * shift[3 * i + d];
+    }
+    for (int i = 0; i < n; i++) {
+        nodes->p[i] += change[4 * i];
+        for (int d = 0; d < dim; d++) {
+            nodes->x[dim * i + d] += shift[3 * i + d];
+            nodes->v[dim * i + d] += change[4 * i + 1 + d];
+        }
+    }
+    free(shift);
+    free(change);
 }

@@ -1,5 +1,5 @@
 /** @file region.c
- * Closed parts of the plane, and the polygon arithmetic that the scene's checks need.
+ * Closed parts of the plane or of space, and the polygon arithmetic that the scene's checks need.
  */
 #include "scene.h"
 
@@ -125,44 +125,72 @@ bool silt_chain_crosses(int n, const double *point, bool closed, int crossing[2]
     return found;
 }
 
-bool silt_region_contains(const silt_region *region, const double *x) {
+bool silt_region_space(const silt_region *region) {
     switch (region->kind) {
     case REGION_BOX:
-        return region->lo[0] <= x[0] && x[0] <= region->hi[0] && region->lo[1] <= x[1] && x[1] <= region->hi[1];
+        return region->hi[2] > region->lo[2];
     case REGION_POLYGON:
+        return region->hi[1] > region->lo[1];
+    case REGION_SPHERE:
+        return true;
+    case REGION_CIRCLE:
+        break;
+    }
+    return false;
+}
+
+bool silt_region_contains(const silt_region *region, const double *x) {
+    const bool space = silt_region_space(region);
+    switch (region->kind) {
+    case REGION_BOX:
+        return region->lo[0] <= x[0] && x[0] <= region->hi[0] && region->lo[1] <= x[1] && x[1] <= region->hi[1] &&
+               (!space || (region->lo[2] <= x[2] && x[2] <= region->hi[2]));
+    case REGION_POLYGON:
+        if (space)
+            return region->lo[1] <= x[1] && x[1] <= region->hi[1] &&
+                   silt_polygon_contains(region->n_point, region->point, (const double[2]){x[0], x[2]});
         return silt_polygon_contains(region->n_point, region->point, x);
     case REGION_CIRCLE:
     case REGION_SPHERE:
-        return silt_square(x[0] - region->centre[0]) + silt_square(x[1] - region->centre[1]) <=
+        return silt_square(x[0] - region->centre[0]) + silt_square(x[1] - region->centre[1]) +
+                   (space ? silt_square(x[2] - region->centre[2]) : 0) <=
                silt_square(region->radius);
     }
     return false;
 }
 
 double silt_region_area(const silt_region *region) {
+    const bool space = silt_region_space(region);
     switch (region->kind) {
     case REGION_BOX:
-        return (region->hi[0] - region->lo[0]) * (region->hi[1] - region->lo[1]);
+        return (region->hi[0] - region->lo[0]) * (region->hi[1] - region->lo[1]) *
+               (space ? region->hi[2] - region->lo[2] : 1);
     case REGION_POLYGON:
-        return silt_polygon_area(region->n_point, region->point);
+        return silt_polygon_area(region->n_point, region->point) * (space ? region->hi[1] - region->lo[1] : 1);
     case REGION_CIRCLE:
-    case REGION_SPHERE:
         return M_PI * silt_square(region->radius);
+    case REGION_SPHERE:
+        return 4 * M_PI / 3 * silt_square(region->radius) * region->radius;
     }
     return 0;
 }
 
-void silt_region_bounds(const silt_region *region, double lo[2], double hi[2]) {
-    for (int k = 0; k < 2; k++) {
-        lo[k] = region->kind == REGION_CIRCLE ? region->centre[k] - region->radius : region->lo[k];
-        hi[k] = region->kind == REGION_CIRCLE ? region->centre[k] + region->radius : region->hi[k];
-        if (region->kind != REGION_POLYGON)
-            continue;
+void silt_region_bounds(const silt_region *region, double *lo, double *hi) {
+    const bool space = silt_region_space(region), ball = region->kind == REGION_CIRCLE || region->kind == REGION_SPHERE;
+    for (int k = 0; k < (space ? 3 : 2); k++) {
+        lo[k] = ball ? region->centre[k] - region->radius : region->lo[k];
+        hi[k] = ball ? region->centre[k] + region->radius : region->hi[k];
+    }
+    if (region->kind != REGION_POLYGON)
+        return;
+    // the prism's corners are x and z
+    for (int c = 0; c < 2; c++) {
+        const int k = space && c == 1 ? 2 : c;
         lo[k] = HUGE_VAL;
         hi[k] = -HUGE_VAL;
         for (int i = 0; i < region->n_point; i++) {
-            lo[k] = silt_min(lo[k], region->point[3 * i + k]);
-            hi[k] = silt_max(hi[k], region->point[3 * i + k]);
+            lo[k] = silt_min(lo[k], region->point[3 * i + c]);
+            hi[k] = silt_max(hi[k], region->point[3 * i + c]);
         }
     }
 }

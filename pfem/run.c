@@ -31,6 +31,7 @@ static void run_view(const silt_run *run, silt_view *view) {
         view->locator = &run->locator;
         view->solid = run->drag ? run->drag->solid : NULL;
         view->iterations = run->fluid.iterations;
+        view->wall_force = (const double(*)[3])run->wall_force;
     }
     if (scene->bed.on)
         view->bed = &run->bed;
@@ -51,46 +52,54 @@ static void ledger_take(silt_run *run) {
     ledger->kinetic_energy = ledger->potential_energy = 0;
     memset(ledger->momentum, 0, sizeof ledger->momentum);
     ledger->mesh_volume = ledger->flying_volume = ledger->fluid_volume = 0;
+    const int D = silt_nodes_dim(nodes);
     for (int e = 0; e < run->mesh.n_cell; e++) {
         const int *cell = run->mesh.cell[e];
-        const double area = silt_cell_area(nodes->x, cell);
-        double water = area, centre[2] = {0, 0};
-        ledger->mesh_volume += area;
-        for (int a = 0; a < 3; a++) {
+        const double volume = silt_cell_volume(&run->mesh, nodes->x, e);
+        double water = volume, corner[12], height = 0;
+        silt_cell_corners(&run->mesh, nodes->x, cell, corner);
+        ledger->mesh_volume += volume;
+        for (int a = 0; a <= D; a++) {
             if (run->drag)
-                water -= area * run->drag->solid[cell[a]] / 3;
-            for (int d = 0; d < 2; d++)
-                centre[d] += nodes->x[2 * cell[a] + d] / 3;
+                water -= volume * run->drag->solid[cell[a]] / (D + 1);
+            for (int d = 0; d < D; d++)
+                height += corner[D * a + d] * scene->gravity[d] / (D + 1);
         }
         ledger->fluid_volume += water;
-        for (int a = 0; a < 3; a++)
-            for (int d = 0; d < 2; d++) {
-                const double m = rho * water / 3, v = nodes->v[2 * cell[a] + d];
+        for (int a = 0; a <= D; a++)
+            for (int d = 0; d < D; d++) {
+                const double m = rho * water / (D + 1), v = nodes->v[D * cell[a] + d];
                 ledger->momentum[d] += m * v;
                 ledger->kinetic_energy += 0.5 * m * v * v;
             }
-        ledger->potential_energy -= rho * water * (centre[0] * scene->gravity[0] + centre[1] * scene->gravity[1]);
+        ledger->potential_energy -= rho * water * height;
     }
     for (int i = 0; i < nodes->count; i++) {
         if (run->mesh.wet[i])
             continue;
         const double volume = nodes->debt[i];
         ledger->flying_volume += volume;
-        for (int d = 0; d < 2; d++) {
-            ledger->momentum[d] += rho * volume * nodes->v[2 * i + d];
-            ledger->kinetic_energy += 0.5 * rho * volume * silt_square(nodes->v[2 * i + d]);
-            ledger->potential_energy -= rho * volume * nodes->x[2 * i + d] * scene->gravity[d];
+        for (int d = 0; d < D; d++) {
+            ledger->momentum[d] += rho * volume * nodes->v[D * i + d];
+            ledger->kinetic_energy += 0.5 * rho * volume * silt_square(nodes->v[D * i + d]);
+            ledger->potential_energy -= rho * volume * nodes->x[D * i + d] * scene->gravity[d];
         }
     }
     ledger->max_speed = 0;
     for (int i = 0; i < nodes->count; i++)
         if (run->mesh.wet[i] || nodes->kind[i] == NODE_FLUID)
-            ledger->max_speed = silt_max(ledger->max_speed, hypot(nodes->v[2 * i], nodes->v[2 * i + 1]));
+            ledger->max_speed = silt_max(ledger->max_speed, silt_length(D, nodes->v + D * i));
     // parcels that wait are solid in the place where they were released
     for (int k = 0; k < run->n_waiting && scene->fluid.on; k++)
         ledger->fluid_volume -= run->waiting[k].mass / scene->bed.density;
     ledger->fluid_volume += ledger->flying_volume;
     ledger->fluid_mass = rho * ledger->fluid_volume;
+    ledger->volume_owed = 0;
+    for (int i = 0; i < nodes->count; i++)
+        ledger->volume_owed += run->mesh.wet[i] ? nodes->debt[i] : 0;
+    if (scene->fluid.on)
+        silt_water_moment(nodes, &run->mesh, run->drag ? run->drag->solid : NULL, rho, (const double[3]){0}, ledger->angular_momentum);
+    ledger->y_plus = run->fluid.law.n_point ? run->fluid.law.y_plus[1] : NAN;
     ledger->bed_mass = run->bed.solid_mass;
     ledger->pore_water_mass = run->bed.pore_water;
     ledger->grain_count = 0;
@@ -162,38 +171,45 @@ static void ledger_balance(silt_run *run) {
 static double step_wanted(const silt_run *run) {
     const silt_scene *scene = run->scene;
     const silt_nodes *nodes = &run->nodes;
-    const double h = scene->fluid.size, g = hypot(scene->gravity[0], scene->gravity[1]);
+    const int D = silt_nodes_dim(nodes);
+    const double g = silt_length(3, scene->gravity);
     double dt = scene->time.step > 0 ? scene->time.step : HUGE_VAL;
     dt = silt_min(dt, scene->time.output);
     if (!scene->fluid.on)
         return dt;
-    double fastest = 0;
-    for (int i = 0; i < nodes->count; i++)
-        if (nodes->kind[i] != NODE_CORNER && nodes->kind[i] != NODE_BED)
-            fastest = silt_max(fastest, hypot(nodes->v[2 * i], nodes->v[2 * i + 1]));
-    if (fastest > 0)
-        dt = silt_min(dt, scene->time.cfl * h / fastest);
-    if (g > 0)
-        dt = silt_min(dt, scene->time.cfl * sqrt(h / g));
+    // time in which a node crosses a cell, or falls as far
+    double least = HUGE_VAL;
+    for (int i = 0; i < nodes->count; i++) {
+        if (nodes->kind[i] == NODE_CORNER || nodes->kind[i] == NODE_BED)
+            continue;
+        const double h = silt_node_h(nodes, i, scene->fluid.size), speed = silt_length(D, nodes->v + D * i);
+        if (speed > 0)
+            least = silt_min(least, h / speed);
+        if (g > 0)
+            least = silt_min(least, sqrt(h / g));
+    }
+    dt = silt_min(dt, scene->time.cfl * least);
     // it grows by half at most, and with grains by one of their steps at least
     if (run->dt > 0) {
         const double small = run->coupling ? silt_coupling_dem.step(run->coupling) : 0;
         dt = silt_min(dt, run->dt + silt_max(small, 0.5 * run->dt));
     }
 
-    // a cell may lose four fifths of its area; slivers do not decide
-    const double least = 0.25 * dt;
-    for (int e = 0; e < run->mesh.n_cell && dt > least; e++) {
+    // a cell may lose four fifths of its volume; slivers do not decide
+    const double shortest = 0.25 * dt;
+    for (int e = 0; e < run->mesh.n_cell && dt > shortest; e++) {
         const int *cell = run->mesh.cell[e];
-        const double area = silt_cell_area(nodes->x, cell);
-        if (area < 0.1 * h * h)
+        double h = 0, volume = silt_cell_volume(&run->mesh, nodes->x, e), start[12], x[12];
+        for (int a = 0; a <= D; a++)
+            h += silt_node_h(nodes, cell[a], scene->fluid.size) / (D + 1);
+        if (volume < (D == 3 ? 0.03 * h * h * h : 0.1 * h * h))
             continue;
-        double x[6];
-        while (dt > least) {
-            for (int a = 0; a < 3; a++)
-                for (int d = 0; d < 2; d++)
-                    x[2 * a + d] = nodes->x[2 * cell[a] + d] + dt * nodes->v[2 * cell[a] + d];
-            if (silt_cell_area(x, (const int[3]){0, 1, 2}) > 0.2 * area)
+        silt_cell_corners(&run->mesh, nodes->x, cell, start);
+        while (dt > shortest) {
+            for (int a = 0; a <= D; a++)
+                for (int d = 0; d < D; d++)
+                    x[D * a + d] = start[D * a + d] + dt * nodes->v[D * cell[a] + d];
+            if (silt_simplex_volume(D, x) > 0.2 * volume)
                 break;
             dt *= 0.8;
         }
@@ -245,16 +261,17 @@ static void clock_advance(silt_run *run, int64_t n) {
 
 // what a try at the water's step changes is put back: prescribed velocities, debts that spread
 static void water_keep(silt_run *run) {
+    const int D = silt_nodes_dim(&run->nodes);
     const size_t n = (size_t)run->nodes.count;
-    SILT_RESERVE(run->v_old, run->v_old_capacity, 2 * run->nodes.count + 2);
+    SILT_RESERVE(run->v_old, run->v_old_capacity, D * run->nodes.count + D);
     SILT_RESERVE(run->debt_old, run->debt_old_capacity, run->nodes.count + 1);
-    memcpy(run->v_old, run->nodes.v, 2 * n * sizeof(double));
+    memcpy(run->v_old, run->nodes.v, (size_t)D * n * sizeof(double));
     memcpy(run->debt_old, run->nodes.debt, n * sizeof(double));
 }
 
 static void water_restore(silt_run *run) {
     const size_t n = (size_t)run->nodes.count;
-    memcpy(run->nodes.v, run->v_old, 2 * n * sizeof(double));
+    memcpy(run->nodes.v, run->v_old, (size_t)silt_nodes_dim(&run->nodes) * n * sizeof(double));
     memcpy(run->nodes.debt, run->debt_old, n * sizeof(double));
     silt_pressure_forget(run->fluid.pressure);
 }
@@ -264,6 +281,7 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
     water_keep(run);
     for (int attempt = 0;; attempt++) {
         silt_status status = SILT_OK;
+        silt_walls_move(&run->walls, scene, run->time + run->dt, run->dt);
         silt_run_prescribe(run);
         if (run->coupling)
             PHASE(dem, status = silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
@@ -272,7 +290,10 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
             return status;
         }
         run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
-        status = silt_fluid_step(&run->fluid, scene, &run->walls, &run->nodes, &run->mesh, run->drag, run->dt, err);
+        const silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
+                                .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
+                                .nodes = &run->nodes, .time = run->time, .dt = run->dt};
+        status = silt_fluid_step(&run->fluid, &step, err);
         run->phase[PHASE_assemble] += run->fluid.seconds_assemble;
         run->phase[PHASE_solve] += run->fluid.seconds_solve;
         if (status == SILT_OK)
@@ -340,16 +361,17 @@ static silt_status step_sane(const silt_run *run, double wanted, silt_error *err
     const silt_nodes *nodes = &run->nodes;
     if (!scene->fluid.on)
         return SILT_OK;
-    const double g = hypot(scene->gravity[0], scene->gravity[1]);
+    const int D = silt_nodes_dim(nodes);
+    const double g = silt_length(3, scene->gravity);
     const double usual = silt_min(scene->time.output, g > 0 ? scene->time.cfl * sqrt(scene->fluid.size / g) : HUGE_VAL);
     if (wanted < 1e-7 * usual) {
         int k = 0;
         for (int i = 0; i < nodes->count; i++)
-            if (hypot(nodes->v[2 * i], nodes->v[2 * i + 1]) > hypot(nodes->v[2 * k], nodes->v[2 * k + 1]))
+            if (silt_length(D, nodes->v + D * i) > silt_length(D, nodes->v + D * k))
                 k = i;
         return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s: a speed of %.3g m/s at (%g, %g) asks for steps of %.3g s; the run has lost its footing",
-                         (long long)run->step + 1, run->time, hypot(nodes->v[2 * k], nodes->v[2 * k + 1]), nodes->x[2 * k],
-                         nodes->x[2 * k + 1], wanted);
+                         (long long)run->step + 1, run->time, silt_length(D, nodes->v + D * k), nodes->x[D * k],
+                         nodes->x[D * k + 1], wanted);
     }
     if (fabs(run->ledger.volume_error) > 0.5)
         return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s: the water's volume is off by %.0f %%; no result after this is worth having",
@@ -368,9 +390,10 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     }
     int64_t n = step_choose(run, wanted);
 
-    SILT_RESERVE(run->x_old, run->x_old_capacity, 2 * run->nodes.count + 2);
+    const int D = silt_nodes_dim(&run->nodes);
+    SILT_RESERVE(run->x_old, run->x_old_capacity, D * (run->nodes.count + 1));
     if (run->nodes.count)
-        memcpy(run->x_old, run->nodes.x, 2 * (size_t)run->nodes.count * sizeof(double));
+        memcpy(run->x_old, run->nodes.x, (size_t)(D * run->nodes.count) * sizeof(double));
     silt_status solved = SILT_OK;
     if (scene->fluid.on)
         solved = water_step(run, &n, err);
@@ -406,6 +429,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         SILT_TRY(status);
     }
     if (scene->fluid.on) {
+        silt_wall_forces(&run->walls, &run->nodes, &run->mesh, run->fluid.reaction, run->wall_force);
         SILT_TRY(silt_run_move(run, err));
         run->ledger.dissipation += run->fluid.dissipated;
         run->ledger.external_work += run->fluid.worked;
@@ -481,6 +505,10 @@ static void run_failed(silt_run *run, silt_error *err) {
 static void run_free(silt_run *run) {
     silt_coupling_dem.close(&run->coupling);
     silt_fluid_clear(&run->fluid);
+    silt_size_free(&run->size);
+    silt_air_clear(&run->air);
+    silt_pockets_clear(&run->pockets);
+    free(run->wall_force);
     silt_mesh_clear(&run->mesh);
     silt_memory_clear(&run->memory);
     silt_locator_clear(&run->locator);
@@ -504,13 +532,15 @@ static void run_free(silt_run *run) {
     free(run->debt_old);
     free(run->wall_before);
     free(run->v_before);
+    free(run->debt_before);
     free(run->map);
     free(run->out);
     free(run->worker);
     free(run->log);
 }
 
-static void run_begin(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock) {
+static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock,
+                             silt_error *err) {
     *run = (silt_run){.scene = scene, .def = *def, .saved_step = -1, .lock = lock};
     run->out = silt_text("%s", out);
     run->log = silt_text("%s/dem.log", out);
@@ -519,9 +549,13 @@ static void run_begin(silt_run *run, const silt_scene *scene, const silt_run_def
     run->summary.status = "running";
     if (def->threads > 0)
         omp_set_num_threads(def->threads);
-    silt_walls_create(&run->walls, scene);
-    silt_run_box(run);
+    run->nodes.dim = run->mesh.dim = scene->dimension;
+    run->mesh.period[0] = scene->period[1] - scene->period[0];
     run->gauge = silt_alloc((size_t)silt_gauges_count(scene) + 1, sizeof *run->gauge);
+    run->wall_force = silt_alloc((size_t)scene->n_wall + 1, sizeof *run->wall_force);
+    SILT_TRY(silt_walls_create(&run->walls, scene, err));
+    silt_run_box(run);
+    return SILT_OK;
 }
 
 // ---------------------------------------------------------------- the loop
@@ -613,9 +647,10 @@ silt_status silt_scene_run(const silt_scene *scene, const silt_run_def *def, sil
     char *out = def->out ? silt_text("%s", def->out) : silt_folder_default(scene);
     silt_status status = silt_folder_prepare(out, def->force, &lock, err);
     if (status == SILT_OK) {
-        run_begin(&run, scene, def, out, lock);
+        status = run_begin(&run, scene, def, out, lock, err);
         signals_catch();
-        status = run_start(&run, err);
+        if (status == SILT_OK)
+            status = run_start(&run, err);
         if (status == SILT_OK)
             status = run_loop(&run, err);
         status = run_close(&run, status, err);
@@ -661,10 +696,13 @@ static silt_status resume_load(silt_run *run, const silt_scene *scene, const sil
         if (step[k] < 0)
             break;
         silt_store *store = NULL;
-        run_begin(run, scene, def, def->out, -1);
-        status = silt_store_open(&store, path[k], &why[k]);
+        status = run_begin(run, scene, def, def->out, -1, &why[k]);
+        if (status == SILT_OK)
+            status = silt_store_open(&store, path[k], &why[k]);
         if (status == SILT_OK)
             status = silt_run_load(run, store, &why[k]);
+        if (status == SILT_OK)
+            silt_walls_move(&run->walls, scene, run->time, 0);
         silt_store_close(&store);
         if (status != SILT_OK) {
             run_free(run);

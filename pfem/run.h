@@ -33,6 +33,10 @@ struct silt_run {
     silt_memory memory;
     silt_locator locator;
     silt_fluid fluid;
+    silt_size *size;         // owned, NULL: fluid.size everywhere
+    silt_air air;            // empty where air has no pressure, as are the pockets
+    silt_pockets pockets;
+    double (*wall_force)[3]; // owned, one per wall of the scene, N, of the water in the last step
     silt_bed bed;
     silt_coupling *coupling; // owned, NULL without grains and bodies
     const silt_drag *drag;   // borrowed from the coupling, NULL: no grain in the water
@@ -77,15 +81,17 @@ struct silt_run {
     double *v_old, *debt_old; // owned, 2 and 1 per node, velocities and debts at the start of the step
     int *wall_before;  // owned, first wall of every node before contact
     double *v_before;  // owned, 2 per node
-    int wall_before_capacity, v_before_capacity;
+    double *debt_before; // owned, 1 per node
+    int wall_before_capacity, v_before_capacity, debt_before_capacity;
     int *map;        // owned, renumbering of the last rebuild
     int x_old_capacity, v_old_capacity, debt_old_capacity, map_capacity;
-    double box_lo[2], box_hi[2]; // what lies outside has left
+    double box_lo[3], box_hi[3]; // what lies outside has left
 };
 
 // start.c ---------------------------------------------------------------------------------------------
 void silt_run_box(silt_run *run);
 silt_status silt_run_first(silt_run *run, silt_error *err);
+silt_status silt_run_pockets(silt_run *run, silt_error *err); // closed air of a fresh mesh
 void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def);
 
 // move.c ----------------------------------------------------------------------------------------------

@@ -18,12 +18,14 @@ typedef struct silt_series {
 } silt_series;
 
 typedef enum { REGION_BOX = 1, REGION_POLYGON, REGION_CIRCLE, REGION_SPHERE } silt_region_kind;
-/** a closed part of the plane or of space; in 3-D a polygon stands upright as a prism in x-z from lo[1] to hi[1] */
+/** A closed part of the plane or of space. In 3-D a polygon stands upright: a prism over its corners (x, z), stored as the
+ * first two of three numbers, from y = lo[1] to y = hi[1] (key `across`). A box with hi[2] > lo[2], a polygon with
+ * hi[1] > lo[1] and a sphere are parts of space, all others of the plane. */
 typedef struct silt_region {
     silt_region_kind kind;
     double lo[3], hi[3];      // box
     int n_point;              // polygon, counter-clockwise after reading
-    double *point;            // owned, 3 per point
+    double *point;            // owned, 3 per point: x, y (3-D: x, z), 0
     double centre[3], radius; // circle, sphere
     char *outline;            // owned, CSV file with the polygon's corners; NULL: given in the scene
 } silt_region;
@@ -34,25 +36,32 @@ typedef enum {
     WALL_LAW, // slip with the traction of the logarithmic law of the wall
     WALL_DEFAULT, // wall law where the flow is turbulent, no-slip where it is laminar; replaced while reading
 } silt_condition;
-/** a chain of straight wall segments with the water on its left */
+/** how a wall is given; a 2-D box becomes a closed polyline while reading */
+typedef enum { WALL_POLYLINE = 1, WALL_BOX, WALL_SURFACE } silt_wall_form;
+/** 2-D: a chain of straight wall segments with the water on its left; 3-D: a box around the water or a triangulated surface */
 typedef struct silt_wall {
-    int n_point;    // at least 2; `box` is read as its closed counter-clockwise outline
+    silt_wall_form form; // 0 counts as a polyline
+    int n_point;    // at least 2; in 2-D `box` is read as its closed counter-clockwise outline
     double *point;  // owned, 3 per point
     bool closed;
     silt_condition condition;
     double roughness; // m, equivalent sand roughness k_s of the wall law; 0: smooth
-    double lo[3], hi[3]; // 3-D: key `box`, a closed box around the water; hi < lo: none
+    double lo[3], hi[3]; // 3-D, WALL_BOX: a closed box around the water; hi < lo after reading: none
     char *surface;       // owned, 3-D: STL or .msh file of a triangulated surface, NULL: none
     double scale;        // 3-D: what the surface's coordinates are multiplied by
     bool inside_out;     // 3-D: the surface's normals point out of the water
-    double velocity[3];  // m/s, of the wall's surface along itself (a lid, a belt)
-    silt_series motion;  // time, x, y, z in m and angle in degrees from the place in the scene (columns by name); n_row 0: stands still
+    double velocity[3];  // m/s, of the wall's surface along itself (a lid, a belt); no part of `motion`
+    silt_series motion;  // time in s first; x, y, z in m and angle in degrees from the place in the scene, by column name, absent
+                         // ones 0; in 3-D the angle turns about the y axis, from x to z; n_row 0: stands still
     double pivot[3];     // m, what `angle` turns about
 } silt_wall;
 
-/** water fed in through the segment from-to (water on its left) with a velocity */
+/** what drives the water in: exactly one is given in a scene */
+typedef enum { INLET_VELOCITY = 1, INLET_HEAD } silt_inlet_drive;
+/** water fed in through the segment from-to (water on its left) */
 typedef struct silt_inlet {
     char *name;
+    silt_inlet_drive drive; // 0 counts as INLET_VELOCITY
     double from[3], to[3];
     double velocity[3];  // m/s; multiplied by column 1 of the series when there is one
     silt_series series;  // n_row 0: constant; in the scene the name of a CSV file
@@ -74,17 +83,25 @@ typedef enum {
     FORMULA_STRAIN,         // rate: v = (-rate x, rate y) about centre
     FORMULA_TAYLOR_GREEN,   // amplitude, length, centre (the box's corner)
     FORMULA_STANDING_WAVE,  // amplitude (m, of the surface), wavelength (length), depth, centre: bed at the left antinode
-    FORMULA_SOLITARY_WAVE,  // amplitude (height H), depth, centre: bed below the crest; sign of rate: direction
-    FORMULA_FIELD,          // CSV of points x,y[,z],vx,vy[,vz]: nearest three (four) points' plane, or the point itself
-    FORMULA_CENTRAL,        // rate: acceleration -rate^2 (x - centre)
-    FORMULA_SERIES,         // CSV over time: time, x, y, z
+    FORMULA_SOLITARY_WAVE,  // amplitude (height H), depth, profile, centre: bed below the crest; sign of rate: direction (0: +x)
+    FORMULA_FIELD,          // CSV of points x,y[,z],vx,vy[,vz]: linear on the Delaunay cell of points around, exact at a point
+    FORMULA_CENTRAL,        // acceleration -rate |rate| (x - centre): to the centre, with a negative rate away from it
+    FORMULA_SERIES,         // CSV over time, the same everywhere; after reading the columns are time, x, y, z
 } silt_formula_kind;
-/** a velocity at the start, or an acceleration (body force) */
+typedef enum { WAVE_BOUSSINESQ = 0, WAVE_GRIMSHAW } silt_wave_profile; // eta = H sech^2(k x), or to third order in H/d
+typedef struct silt_field silt_field; // the points of FORMULA_FIELD by place (formula.c)
+/** A velocity at the start, or an acceleration (body force). In 3-D the plane of the 2-D formulas is x-z; a solid rotation
+ * is right-handed about `axis`. */
 typedef struct silt_formula {
     silt_formula_kind kind;
-    double vector[3], centre[3]; // vector: the velocity, or added to the formula's
+    int dimension;               // 2 or 3; 0 counts as 2
+    int axis;                    // 3-D: 1 to 3: x, y, z; 0: z for a rotation, for CENTRAL the distance from the point
+    double vector[3], centre[3]; // vector: added to what the formula gives, to every kind but FORMULA_NONE
     double rate, amplitude, length, depth;
-    silt_series series; // FIELD, SERIES
+    silt_wave_profile profile;
+    double wave[6];     // of the solitary wave's velocity, see formula.c; wave[0] = 0: not found yet
+    silt_series series; // FIELD: columns x, y[, z], vx, vy[, vz] in this order after reading; SERIES
+    silt_field *field;  // owned, FIELD: made while reading; NULL: the series is searched from end to end
 } silt_formula;
 
 /** how water flows in the small */
@@ -98,7 +115,7 @@ typedef struct silt_size_def {
     silt_near near;     // what the size belongs to
     silt_region region; // NEAR_REGION
     double size;        // m
-    double distance;    // m, how far around it the size holds
+    double distance;    // 0, m, how far around it the size holds
 } silt_size_def;
 
 typedef enum { SCHEME_IMPLICIT = 0, SCHEME_FRACTIONAL } silt_scheme;
@@ -112,14 +129,14 @@ typedef struct silt_fluid_def {
     silt_scheme scheme;             // scheme: implicit | fractional
     silt_pressure_operator pressure; // pressure: consistent | laplacian
     silt_flow flow;             // flow: turbulent | laminar
-    silt_turbulence turbulence; // auto: mixing-length in 2-D, wale in 3-D when the flow is turbulent, else none
-    double wall_height;  // times h, where the wall law samples the velocity
+    silt_turbulence turbulence; // auto: mixing-length in 2-D, wale in 3-D when the flow is turbulent, else none; replaced while reading
+    double wall_height;  // 2, times h, where the wall law samples the velocity
     silt_rheology rheology;
-    double yield_stress; // Pa
-    double flow_index;   // n of Herschel-Bulkley: stress = yield_stress + viscosity rate^n
-    double plastic_rate; // 1/s, shear rate below which the yield stress is smoothed
+    double yield_stress; // Pa, 0
+    double flow_index;   // 1, n of Herschel-Bulkley: stress = yield_stress + viscosity rate^n
+    double plastic_rate; // 1e-3 1/s, shear rate below which the yield stress is smoothed (regularised)
     int order;           // 2: trapezoidal in time, 1: backward Euler
-    double theta;        // 0.5 to 1, implicitness of the step; 0: what `order` says
+    double theta;        // 0.5 to 1, implicitness of the step; key 0: what `order` says, replaced while reading
     double alpha;        // 1.3, alpha shape of what was water a step ago, times h
     double merge;        // width of a gap between two surfaces that closes and becomes water, times h
     double tolerance;    // relative residual of the continuity equation
@@ -130,13 +147,13 @@ typedef struct silt_fluid_def {
     int seed;
     int n_region;
     silt_region *region; // owned
-    char *cloud;         // owned, CSV file of nodes x,y[,z][,vx,vy[,vz]] in place of the regular cloud; NULL: none
+    char *cloud;         // owned, CSV file of nodes x,y[,z][,vx,vy[,vz]] by name in place of the regular cloud; NULL: none
     double shuffle;      // times h: inner nodes are shifted at random in every step (a test of remeshing)
-    double size_growth;  // largest change of size per distance
+    double size_growth;  // 0.3, largest change of size per distance
     int n_size;
     silt_size_def *size_at; // owned; key `sizes`
-    double air_pressure; // Pa, of closed air pockets at their making; 0: pockets have no pressure
-    double air_exponent; // 1.4
+    double air_pressure; // 0, Pa, absolute, of closed air pockets at their making; 0: pockets have no pressure
+    double air_exponent; // 1.4, of their adiabatic compression
     silt_formula force;  // acceleration besides gravity; key body_force
     int n_inlet;
     silt_inlet *inlet; // owned
@@ -216,23 +233,47 @@ typedef struct silt_body_def {
 
 typedef enum {
     GAUGE_FRONT = 1,  // front: x | -x: the foremost x of connected water
-    GAUGE_HEIGHT,     // height_at: X: top of connected water above that x
-    GAUGE_WETTED,     // wetted_at: [x, y]: 1 when water is there
-    GAUGE_PRESSURE,   // pressure_at: [x, y]
-    GAUGE_VELOCITY,   // velocity_at: [x, y]: columns NAME_x, NAME_y, NAME_z
+    GAUGE_HEIGHT,     // height_at: X (3-D: [x, y], in from[0] and from[1]): top of connected water above that place
+    GAUGE_WETTED,     // wetted_at: [x, y] (3-D: [x, y, z]): 1 when water is there
+    GAUGE_PRESSURE,   // pressure_at: [x, y] (3-D: [x, y, z])
+    GAUGE_VELOCITY,   // velocity_at: [x, y] (3-D: [x, y, z]): columns NAME_x, NAME_y, NAME_z
     GAUGE_DISCHARGE,  // discharge: [[x, y], [x, y]]: m2/s through the segment, left to right
     GAUGE_BED_LEVEL,  // bed_level_at: X
     GAUGE_SCOUR,      // scour_at: X: how deep the bed lies under its level at the start
+    GAUGE_EXTENT,     // extent: x | y | z: length of connected water along that axis
+    GAUGE_FORCE,      // force_on: I: force of the water on wall I of the scene: columns NAME_x, NAME_y, NAME_z
+    GAUGE_ANGULAR,    // angular_momentum_about: [x, y]; in 3-D columns NAME_x, NAME_y, NAME_z
+    GAUGE_CENTROID,   // centroid_of: water: columns NAME_x, NAME_y, NAME_z
 } silt_gauge_kind;
 typedef struct silt_gauge_def {
     char *name; // column name(s) in history.csv
     silt_gauge_kind kind;
-    double from[3], to[3]; // place; FRONT: from[0] is +1 or -1
+    double from[3], to[3]; // place; FRONT: from[0] is +1 or -1; EXTENT: from[0] is the axis, 0 to 2
+    int index;             // FORCE: of the wall
 } silt_gauge_def;
+/** how many history columns gauge i has, and the name of its k-th one (gauge.c) */
+int silt_gauge_columns(const silt_scene *scene, int i);
+void silt_gauge_column(const silt_scene *scene, int i, int k, char name[64]);
 
 typedef enum { NORM_L2 = 1, NORM_MAX } silt_norm;
-typedef enum { SCALAR_NONE = 0, SCALAR_MAX, SCALAR_MIN, SCALAR_LAST, SCALAR_MEAN, SCALAR_PERIOD, SCALAR_SLOPE } silt_scalar;
-/** what to hold the result against: a history column against a CSV column, or a scalar of it against a value.
+typedef enum {
+    SCALAR_NONE = 0,
+    SCALAR_MAX,
+    SCALAR_MIN,
+    SCALAR_LAST,
+    SCALAR_MEAN,
+    SCALAR_PERIOD,    // mean distance of upward crossings of `level`, or of the mean
+    SCALAR_SLOPE,     // least squares
+    SCALAR_AT,        // the ordinate at abscissa `at`
+    SCALAR_REACHES,   // the first abscissa where the ordinate passes `level`
+    SCALAR_AMPLITUDE, // half of the largest less the smallest
+    SCALAR_DECAY,     // rate at which the heights of successive half waves fall
+} silt_scalar;
+/** what a check looks at */
+typedef enum { CHECK_COLUMN = 1, CHECK_PROFILE } silt_check_kind;
+/** what a profile shows along a line */
+typedef enum { PROFILE_SURFACE = 1, PROFILE_VELOCITY_X, PROFILE_VELOCITY_Y, PROFILE_VELOCITY_Z, PROFILE_SPEED, PROFILE_PRESSURE } silt_profile;
+/** what to hold the result against: a history column or a profile against a CSV column, or a scalar of the column against a value.
  * The history's abscissa is time_scale * (time + time_shift), its ordinate scale * (column + shift). */
 typedef struct silt_check_def {
     char *name;
@@ -250,6 +291,13 @@ typedef struct silt_check_def {
     silt_scalar scalar; // scalar: max | min | last | mean | period | slope
     double value;       // expected scalar
     double low, high;   // or the allowed range instead of value and tolerance; NaN when not given
+    silt_check_kind kind;
+    // a profile: along the line at a time of the frames; abscissa place_scale * (distance from the line's start + place_shift)
+    silt_profile profile;
+    double line[6];     // m, two points; equal: the x axis
+    double place_scale, place_shift;
+    double at;          // s, time of the profile; abscissa of SCALAR_AT
+    double level;       // ordinate of SCALAR_REACHES and SCALAR_PERIOD; NaN: the mean
     double tolerance;   // relative to |value|, absolute when value is 0
 } silt_check_def;
 
@@ -299,9 +347,16 @@ silt_status silt_series_rising(const silt_series *series, silt_error *err);
 /** what a scene needs */
 static inline bool silt_scene_has_dem(const silt_scene *s) { return s->grains.on || s->n_body > 0; }
 
+/** which coordinate points up: y in 2-D, z in 3-D */
+static inline int silt_scene_up(const silt_scene *s) { return s->dimension == 3 ? 2 : 1; }
+
+/** a part of space (points of three numbers), not of the plane (two) */
+bool silt_region_space(const silt_region *region);
+/** @param x  2 numbers, 3 for a part of space */
 bool silt_region_contains(const silt_region *region, const double *x);
-double silt_region_area(const silt_region *region);
-void silt_region_bounds(const silt_region *region, double lo[2], double hi[2]);
+double silt_region_area(const silt_region *region); /**< m2; m3 of a part of space */
+/** the box around it: 2 numbers each, 3 for a part of space */
+void silt_region_bounds(const silt_region *region, double *lo, double *hi);
 
 // polygons and chains, 3 numbers per point, the third unused
 double silt_polygon_area(int n, const double *point); /**< positive when counter-clockwise */
@@ -312,12 +367,34 @@ bool silt_chain_straight(int n, const double *point); /**< all points on one lin
 /** true when two edges meet elsewhere than at a shared corner; crossing: their indices, the smaller first */
 bool silt_chain_crosses(int n, const double *point, bool closed, int crossing[2]);
 
-/** velocity of the formula at x, m/s; g is the gravity's magnitude (standing wave) */
+/** Velocity of the formula at x, m/s.
+ * @param g  m/s2, magnitude of gravity (waves)
+ * @param x  m, formula->dimension numbers
+ * @param v  out, 3 numbers, the third 0 in 2-D */
 void silt_formula_velocity(const silt_formula *formula, double g, const double *x, double *v);
+/** Acceleration of a body force at time and x, m/s2; x and a as above. */
+void silt_formula_acceleration(const silt_formula *formula, double time, const double *x, double *a);
+/** height of the solitary wave's surface over still water at x[0], m */
+double silt_formula_surface(const silt_formula *formula, const double *x);
+/** Does once what every look-up would do anew: sorts the points of FORMULA_FIELD by place, so that a look-up takes
+ * O(log n), finds the coefficients of FORMULA_SOLITARY_WAVE. Called while reading; without it both are only slower.
+ * @return -1, or the row of a point of the field that stands there twice (it is not sorted then) */
+int silt_formula_prepare(silt_formula *formula);
+void silt_formula_clear(silt_formula *formula); /**< frees series and field */
+
+/** The files that the scene reads, with their folders, in the order of the resolved text; the same file may come twice.
+ * @return how many; *file is owned by the caller, the names are the scene's */
+int silt_scene_files(const silt_scene *scene, const char ***file);
+/** the resolved text with file k called name[k]; owned by the caller */
+char *silt_scene_text_named(const silt_scene *scene, const char *const *name);
 
 /** Prints what the table of keys says: one line per key when key is NULL, a block's keys, or all about one key
  * ("fluid.size", "bodies.density"; a last part alone will do). Errors: SILT_INPUT, no such key, with the nearest. */
 silt_status silt_scene_help(const char *key, FILE *to, silt_error *err);
+/** The resolved scene with other names for the files that it reads; owned by the caller.
+ * @param name  called with every file in the order of the text: what is written in its place, valid until the next call */
+typedef const char *silt_file_name(void *self, const char *path);
+char *silt_scene_named(const silt_scene *scene, silt_file_name *name, void *self);
 /** Prints docs/scene.md: every key of the table in markdown. */
 void silt_scene_document(FILE *to);
 

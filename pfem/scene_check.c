@@ -13,7 +13,14 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     const silt_tree *bodies = silt_tree_item(root, "bodies"), *fluid = silt_tree_item(root, "fluid");
     const silt_tree *bed = silt_tree_item(root, "bed"), *grains = silt_tree_item(root, "grains");
     bool has_bodies = scene->n_body > 0;
-    if (!fluid && !grains && !has_bodies && !bodies)
+    if (scene->dimension == 3) {
+        // the others were refused already
+        bed = grains = bodies = NULL;
+        if (!fluid)
+            silt_complain(
+                reader, root,
+                "key 'fluid': found no water, allowed a scene with fluid: the rest is two-dimensional so far");
+    } else if (!fluid && !grains && !has_bodies && !bodies)
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
                       "one of fluid, grains, bodies");
@@ -35,20 +42,17 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
                           "key '%s': found it without contact properties, allowed with a block contact "
                           "{youngs_modulus, poissons_ratio, restitution, friction, rolling_friction}",
                           first->key);
-    if (scene->fluid.on && !silt_tree_item(fluid, "regions") && !silt_tree_item(fluid, "inlets"))
-        silt_complain_key(reader, fluid,
-                          "key 'fluid.regions': found neither regions nor inlets, allowed at least one: "
-                          "there is no water");
+    if (scene->fluid.on && !silt_tree_item(fluid, "regions") && !silt_tree_item(fluid, "inlets") &&
+        !silt_tree_item(fluid, "cloud"))
+        silt_complain_key(reader, fluid, "key 'fluid.regions': found %s, allowed at least one: there is no water",
+                          scene->dimension == 3 ? "no regions" : "neither regions nor inlets");
     const silt_tree *regions = silt_tree_item(bed, "regions");
     if (regions && regions->kind == TREE_LIST && regions->n_item == 0)
         silt_complain(reader, regions, "key 'bed.regions': found an empty list, allowed at least one region");
 }
 
-// a dimension that is there, and a number of frames that fits their names
+// a number of frames that fits their names
 static void check_time(silt_reader *reader, const silt_scene *scene) {
-    const silt_tree *dimension = silt_tree_item(reader->root, "dimension");
-    if (scene->dimension == 3)
-        silt_complain(reader, dimension, "key 'dimension': found 3, allowed 2: three dimensions are not there yet");
     if (scene->time.output > 0 && scene->time.end / scene->time.output > 999999)
         silt_complain(reader, silt_tree_find(reader->root, "time.output"),
                       "key 'time.output': found %.10g, which makes %.10g frames, allowed at most 999999",
@@ -62,8 +66,6 @@ static void check_walls(silt_reader *reader, silt_scene *scene) {
         const silt_tree *node = silt_tree_find(reader->root, "walls.%d", i);
         const silt_tree *line = silt_tree_item(node, "polyline");
         int n = wall->n_point, crossing[2];
-        if (silt_tree_item(node, "box"))
-            wall->closed = true;
         // the first point again at the end says closed
         if (n > 2 && wall->point[0] == wall->point[3 * n - 3] && wall->point[1] == wall->point[3 * n - 2]) {
             wall->n_point = --n;
@@ -116,20 +118,23 @@ static void check_openings(silt_reader *reader, const silt_scene *scene) {
 // inside the walls -------------------------------------------------------------------------------------
 /** the box spanned by walls and water; open where things fall in from */
 typedef struct check_box {
-    double lo[2], hi[2], slack;
-    bool open_low[2], open_high[2];
+    int dim;
+    double lo[3], hi[3], slack;
+    bool open_low[3], open_high[3];
     bool known;
 } check_box;
 
 // false for a region that a complaint was already made about
-static bool check_region_whole(const silt_region *region) {
-    return (region->kind == REGION_BOX && region->lo[0] < region->hi[0]) ||
-           (region->kind == REGION_POLYGON && region->n_point > 0) ||
-           (region->kind == REGION_CIRCLE && region->radius > 0);
+static bool check_region_whole(const silt_scene *scene, const silt_region *region) {
+    return silt_region_space(region) == (scene->dimension == 3) &&
+           ((region->kind == REGION_BOX && region->lo[0] < region->hi[0]) ||
+            (region->kind == REGION_POLYGON && region->n_point > 0) ||
+            (region->kind == REGION_CIRCLE && region->radius > 0) ||
+            (region->kind == REGION_SPHERE && region->radius > 0));
 }
 
 static void check_box_add(check_box *box, const double *lo, const double *hi) {
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < box->dim; k++) {
         box->lo[k] = silt_min(box->lo[k], lo[k]);
         box->hi[k] = silt_max(box->hi[k], hi[k]);
     }
@@ -138,28 +143,38 @@ static void check_box_add(check_box *box, const double *lo, const double *hi) {
 
 // spanned by the walls alone, or by walls and water; what has gravity behind it may come in from above
 static check_box check_box_make(const silt_scene *scene, bool water) {
-    check_box box = {.lo = {HUGE_VAL, HUGE_VAL}, .hi = {-HUGE_VAL, -HUGE_VAL}};
-    for (int i = 0; i < scene->n_wall; i++)
-        for (int k = 0; k < scene->wall[i].n_point; k++)
-            check_box_add(&box, scene->wall[i].point + 3 * k, scene->wall[i].point + 3 * k);
+    check_box box = {.dim = scene->dimension == 3 ? 3 : 2,
+                     .lo = {HUGE_VAL, HUGE_VAL, HUGE_VAL},
+                     .hi = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}};
+    const int up = silt_scene_up(scene);
+    for (int i = 0; i < scene->n_wall; i++) {
+        const silt_wall *wall = &scene->wall[i];
+        // where a surface lies is not known here
+        if (wall->surface)
+            return box;
+        for (int k = 0; k < wall->n_point; k++)
+            check_box_add(&box, wall->point + 3 * k, wall->point + 3 * k);
+        if (wall->form == WALL_BOX && wall->lo[0] < wall->hi[0])
+            check_box_add(&box, wall->lo, wall->hi);
+    }
     for (int i = 0; water && i < scene->fluid.n_region; i++) {
-        double lo[2], hi[2];
-        if (!check_region_whole(&scene->fluid.region[i]))
+        double lo[3], hi[3];
+        if (!check_region_whole(scene, &scene->fluid.region[i]))
             continue;
         silt_region_bounds(&scene->fluid.region[i], lo, hi);
         check_box_add(&box, lo, hi);
     }
     box.slack = box.known ? 1e-9 * (box.hi[0] - box.lo[0] + box.hi[1] - box.lo[1]) : 0;
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < box.dim; k++) {
         box.open_low[k] = scene->gravity[k] > 0;
-        box.open_high[k] = scene->gravity[k] < 0 || (k == 1 && scene->gravity[1] == 0);
+        box.open_high[k] = scene->gravity[k] < 0 || (k == up && scene->gravity[up] == 0);
     }
     return box;
 }
 
 static bool check_box_holds(const check_box *box, const double *lo, const double *hi, double slack) {
     slack += box->slack;
-    for (int k = 0; k < 2; k++)
+    for (int k = 0; k < box->dim; k++)
         if ((!box->open_low[k] && lo[k] < box->lo[k] - slack) || (!box->open_high[k] && hi[k] > box->hi[k] + slack))
             return false;
     return true;
@@ -172,30 +187,37 @@ check_outside(silt_reader *reader, const silt_tree *node, const check_box *box, 
     va_start(list, format);
     vsnprintf(path, sizeof path, format, list);
     va_end(list);
-    silt_complain(reader, node,
-                  "key '%s': found it outside of the walls, allowed inside of the box from [%.10g, %.10g] to "
-                  "[%.10g, %.10g] that the walls and the water span",
-                  path, box->lo[0], box->lo[1], box->hi[0], box->hi[1]);
+    if (box->dim == 3)
+        silt_complain(
+            reader, node,
+            "key '%s': found it outside of the walls, allowed inside of the box from [%.10g, %.10g, %.10g] to "
+            "[%.10g, %.10g, %.10g] that the walls and the water span",
+            path, box->lo[0], box->lo[1], box->lo[2], box->hi[0], box->hi[1], box->hi[2]);
+    else
+        silt_complain(reader, node,
+                      "key '%s': found it outside of the walls, allowed inside of the box from [%.10g, %.10g] to "
+                      "[%.10g, %.10g] that the walls and the water span",
+                      path, box->lo[0], box->lo[1], box->hi[0], box->hi[1]);
 }
 
 // water, bed and grains where the walls can hold them
 static void check_inside(silt_reader *reader, const silt_scene *scene) {
     check_box walls = check_box_make(scene, false), box = check_box_make(scene, true);
-    double lo[2], hi[2];
+    double lo[3], hi[3];
     // water is outside when it lies beside the walls altogether, or below them
     for (int i = 0; walls.known && i < scene->fluid.n_region; i++) {
-        if (!check_region_whole(&scene->fluid.region[i]))
+        if (!check_region_whole(scene, &scene->fluid.region[i]))
             continue;
         silt_region_bounds(&scene->fluid.region[i], lo, hi);
         bool apart = false;
-        for (int k = 0; k < 2; k++)
+        for (int k = 0; k < walls.dim; k++)
             apart |= (!walls.open_low[k] && hi[k] <= walls.lo[k] && walls.hi[k] > walls.lo[k]) ||
                      (!walls.open_high[k] && lo[k] >= walls.hi[k] && walls.hi[k] > walls.lo[k]);
         if (apart)
             check_outside(reader, silt_tree_find(reader->root, "fluid.regions.%d", i), &walls, "fluid.regions.%d", i);
     }
     for (int i = 0; box.known && i < scene->bed.n_region; i++) {
-        if (!check_region_whole(&scene->bed.region[i]))
+        if (!check_region_whole(scene, &scene->bed.region[i]))
             continue;
         silt_region_bounds(&scene->bed.region[i], lo, hi);
         if (!check_box_holds(&box, lo, hi, 0))
@@ -205,6 +227,28 @@ static void check_inside(silt_reader *reader, const silt_scene *scene) {
         const double *at = scene->grains.grain[i].at;
         if (!check_box_holds(&box, at, at, 0))
             check_outside(reader, silt_tree_find(reader->root, "grains.list.%d.at", i), &box, "grains.list.%d.at", i);
+    }
+}
+
+// what repeats lies inside of one period
+static void check_period(silt_reader *reader, const silt_scene *scene) {
+    const double *period = scene->period, slack = 1e-9 * (period[1] - period[0]);
+    if (!(period[0] < period[1]))
+        return;
+    if (scene->fluid.on && period[1] - period[0] < 6 * scene->fluid.size)
+        silt_complain(reader, silt_tree_item(reader->root, "periodic"),
+                      "key 'periodic': found a period of %.10g m, allowed at least 6 fluid.size",
+                      period[1] - period[0]);
+    for (int i = 0; i < scene->fluid.n_region; i++) {
+        double lo[3], hi[3];
+        if (!check_region_whole(scene, &scene->fluid.region[i]))
+            continue;
+        silt_region_bounds(&scene->fluid.region[i], lo, hi);
+        if (lo[0] < period[0] - slack || hi[0] > period[1] + slack)
+            silt_complain(reader, silt_tree_find(reader->root, "fluid.regions.%d", i),
+                          "key 'fluid.regions.%d': found it from x = %.10g to %.10g, allowed inside of the period from "
+                          "%.10g to %.10g",
+                          i, lo[0], hi[0], period[0], period[1]);
     }
 }
 
@@ -399,6 +443,13 @@ static const char *const check_fixed[] = {"step",
                                           "volume_solved",
                                           "volume_moved",
                                           "volume_reconnected",
+                                          "volume_refined",
+                                          "volume_given",
+                                          "volume_owed",
+                                          "y_plus",
+                                          "angular_momentum_x",
+                                          "angular_momentum_y",
+                                          "angular_momentum_z",
                                           "bed_mass",
                                           "released_mass",
                                           "deposited_mass",
@@ -454,12 +505,10 @@ static check_column *check_columns(const silt_scene *scene, int *count) {
             snprintf(column[n++].name, sizeof column->name, "%.40s_%s", scene->body[i].name, check_of_body[k]);
         }
     for (int i = 0; i < scene->n_gauge; i++)
-        for (int k = 0; k < (scene->gauge[i].kind == GAUGE_VELOCITY ? 3 : 1) && scene->gauge[i].name; k++) {
+        for (int k = 0; k < silt_gauge_columns(scene, i) && scene->gauge[i].name; k++) {
             SILT_RESERVE(column, capacity, n + 1);
             column[n].owner = scene->n_body + i;
-            const char *ending = scene->gauge[i].kind == GAUGE_VELOCITY ? check_of_body[k] : NULL;
-            snprintf(column[n++].name, sizeof column->name, "%.40s%s%s", scene->gauge[i].name, ending ? "_" : "",
-                     ending ? ending : "");
+            silt_gauge_column(scene, i, k, column[n++].name);
         }
     qsort(column, (size_t)n, sizeof *column, check_column_order);
     *count = n;
@@ -530,7 +579,7 @@ static void check_target(silt_reader *reader, const silt_scene *scene, int i, co
     if (gauge) {
         for (int k = 0; k < scene->n_gauge; k++)
             if (scene->gauge[k].name && strcmp(scene->gauge[k].name, check->column) == 0) {
-                if (scene->gauge[k].kind == GAUGE_VELOCITY)
+                if (silt_gauge_columns(scene, k) == 3)
                     silt_complain(reader, gauge,
                                   "key 'checks.%d.gauge': found '%s', which has three columns, allowed column: "
                                   "%s_x, %s_y or %s_z",
@@ -584,6 +633,26 @@ static void check_reference(silt_reader *reader, silt_check_def *check, int i, c
     silt_series_clear(&table);
 }
 
+// what a check needs besides: the abscissa of a scalar, the time of a profile, the line of a field
+static void check_places(silt_reader *reader, const silt_scene *scene, int i, const silt_tree *node) {
+    const silt_check_def *check = &scene->check[i];
+    const bool profile = check->kind == CHECK_PROFILE;
+    if ((profile || check->scalar == SCALAR_AT) && isnan(check->at))
+        silt_complain(reader, node, "key 'checks.%d.at': found nothing in this block, allowed a number: %s", i,
+                      profile ? "the time of the profile in s" : "where the scalar is taken");
+    if (check->scalar == SCALAR_REACHES && isnan(check->level))
+        silt_complain(reader, node,
+                      "key 'checks.%d.level': found nothing in this block, allowed a number: what the scalar waits for",
+                      i);
+    if (profile && check->profile > PROFILE_SURFACE && !silt_tree_item(node, "line"))
+        silt_complain(reader, node,
+                      "key 'checks.%d.line': found nothing in this block, allowed two different points: "
+                      "where the profile is taken",
+                      i);
+    if (profile && check->profile && !check->reference)
+        silt_complain(reader, node, "key 'checks.%d.reference': found nothing in this block, allowed a CSV file", i);
+}
+
 // each check has one target, one thing to hold it against, and a tolerance
 static void check_checks(silt_reader *reader, silt_scene *scene, const check_column *column, int n) {
     for (int i = 0; i < scene->n_check; i++) {
@@ -592,10 +661,12 @@ static void check_checks(silt_reader *reader, silt_scene *scene, const check_col
         if (!node || node->kind != TREE_MAPPING)
             continue;
         check_target(reader, scene, i, column, n);
+        check_places(reader, scene, i, node);
         const silt_tree *reference = silt_tree_item(node, "reference"), *scalar = silt_tree_item(node, "scalar");
         const silt_tree *value = silt_tree_item(node, "value"), *range = silt_tree_item(node, "range");
         bool is_scalar = check->scalar != SCALAR_NONE;
-        if (!reference && (!scalar || strcmp(scalar->text ? scalar->text : "", "none") == 0))
+        if (check->kind != CHECK_PROFILE && !reference &&
+            (!scalar || strcmp(scalar->text ? scalar->text : "", "none") == 0))
             silt_complain(reader, node, "key 'checks.%d': found neither a reference nor a scalar, allowed one of them",
                           i);
         else if (reference && is_scalar)
@@ -624,13 +695,30 @@ static void check_checks(silt_reader *reader, silt_scene *scene, const check_col
     }
 }
 
+// gauges that need a wall, or an axis of space
+static void check_gauges(silt_reader *reader, const silt_scene *scene) {
+    for (int i = 0; i < scene->n_gauge; i++) {
+        const silt_gauge_def *gauge = &scene->gauge[i];
+        const silt_tree *node = silt_tree_find(reader->root, "gauges.%d", i);
+        if (gauge->kind == GAUGE_FORCE && gauge->index >= scene->n_wall)
+            silt_complain(reader, silt_tree_item(node, "force_on"),
+                          "key 'gauges.%d.force_on': found %d, allowed the number of a wall, the first is 0; there are %d", i,
+                          gauge->index, scene->n_wall);
+        if (gauge->kind == GAUGE_EXTENT && gauge->from[0] == 2 && scene->dimension != 3)
+            silt_complain(reader, silt_tree_item(node, "extent"),
+                          "key 'gauges.%d.extent': found z, allowed x or y in two dimensions", i);
+    }
+}
+
 void silt_scene_check(silt_reader *reader, silt_scene *scene) {
     check_blocks(reader, scene);
     check_time(reader, scene);
     check_walls(reader, scene);
     check_openings(reader, scene);
     check_inside(reader, scene);
+    check_period(reader, scene);
     check_bodies(reader, scene);
+    check_gauges(reader, scene);
     int n;
     check_column *column = check_columns(scene, &n);
     check_names(reader, scene, column, n);

@@ -148,16 +148,20 @@ static const char *help_type(const silt_key *key) {
     case KEY_NAME:
         return "name";
     case KEY_FILE:
+    case KEY_SURFACE:
     case KEY_SERIES:
+    case KEY_TABLE:
         return "file";
     case KEY_POINT:
         return "[x, y]";
+    case KEY_PLACE:
+        return "number";
     case KEY_PAIR:
+    case KEY_ACROSS:
         return "[low, high]";
     case KEY_SEGMENT:
         return "[[x, y], [x, y]]";
     case KEY_BOX:
-    case KEY_OUTLINE:
         return "[[x0, y0], [x1, y1]]";
     case KEY_CHAIN:
     case KEY_POLYGON:
@@ -170,7 +174,7 @@ static const char *help_type(const silt_key *key) {
     return "";
 }
 
-char *silt_key_allowed(const silt_key *key) {
+char *silt_key_allowed(const silt_key *key, int dimension) {
     char *text = NULL;
     size_t size = 0;
     FILE *to = open_memstream(&text, &size);
@@ -178,13 +182,18 @@ char *silt_key_allowed(const silt_key *key) {
         return silt_text("%s", help_type(key));
     if (key->words) {
         help_words(to, key->words);
-    } else if (key->kind == KEY_BOX || key->kind == KEY_OUTLINE) {
-        fprintf(to, "two corners [[x0, y0], [x1, y1]] with x0 < x1 and y0 < y1");
+    } else if (key->kind == KEY_BOX) {
+        fprintf(to, dimension == 3 ? "two corners [[x0, y0, z0], [x1, y1, z1]] with x0 < x1, y0 < y1 and z0 < z1"
+                                   : "two corners [[x0, y0], [x1, y1]] with x0 < x1 and y0 < y1");
+    } else if (key->kind == KEY_POINT && dimension == 3) {
+        fprintf(to, "[x, y, z]");
+    } else if (key->kind == KEY_POLYGON && dimension == 3) {
+        fprintf(to, "a list of 3 or more points [[x, z], ...]");
     } else if (key->kind == KEY_SEGMENT) {
         fprintf(to, "two different points [[x, y], [x, y]]");
     } else if (key->kind == KEY_CHAIN || key->kind == KEY_POLYGON) {
         fprintf(to, "a list of %d or more points [[x, y], ...]", key->kind == KEY_CHAIN ? 2 : 3);
-    } else if (key->kind == KEY_PAIR) {
+    } else if (key->kind == KEY_PAIR || key->kind == KEY_ACROSS) {
         fprintf(to, "two numbers [low, high] with low < high%s",
                 key->flags & KEY_INFINITE ? ", -.inf and .inf too" : "");
     } else if (key->kind == KEY_BLOCK) {
@@ -197,7 +206,9 @@ char *silt_key_allowed(const silt_key *key) {
         fprintf(to, "%s", help_type(key));
     } else if (key->kind == KEY_NAME) {
         fprintf(to, "a name of letters, digits and underscores that begins with a letter");
-    } else if (key->kind == KEY_FILE || key->kind == KEY_SERIES) {
+    } else if (key->kind == KEY_SURFACE) {
+        fprintf(to, "an STL or .msh file beside the scene");
+    } else if (key->kind == KEY_FILE || key->kind == KEY_SERIES || key->kind == KEY_TABLE) {
         fprintf(to, "a CSV file beside the scene");
     } else {
         fprintf(to, "%s %s", key->kind == KEY_INTEGER || key->kind == KEY_LONG ? "an" : "a", help_type(key));
@@ -266,6 +277,8 @@ static void help_doc(FILE *to, const silt_key_table *table, const silt_key *key)
     if (key->when && *key->doc)
         fprintf(to, "; ");
     help_when(to, table, key);
+    if (key->flags & (KEY_PLANE | KEY_SPACE))
+        fprintf(to, key->flags & KEY_PLANE ? "; 2-D only" : "; 3-D only");
 }
 
 static void help_line(FILE *to, const silt_key_table *table, const char *path, const silt_key *key) {
@@ -402,14 +415,33 @@ static void help_section(FILE *to, const silt_key_table *table, const char *path
 }
 
 void silt_scene_document(FILE *to) {
+    fprintf(to,
+            "# Keys of a scene\n\n"
+            "This page is made from the table in `pfem/scene_keys.c`; `silt help KEY` prints the same.\n\n"
+            "A scene is a YAML 1.2 (or JSON) file. Units are SI, angles in degrees. Points have two numbers "
+            "[x, y], y up, in two dimensions (a third one must be 0) and three\n[x, y, z], z up, in three. Physical "
+            "properties have no default, numerical ones have one. Of the keys marked \"one of\" "
+            "exactly one is given per item.\nFiles are CSV files beside the scene: `#` comments, a header with names, "
+            "numbers.\n`-D path=value` replaces or adds a key from the command line; list items by number or by their "
+            "name:\n`-D fluid.size=0.01`, `-D bodies.0.density=700`, `-D bodies.temple.density=700`.\n\n");
+    help_section(to, &silt_scene_keys, "", false);
     fprintf(
         to,
-        "# Keys of a scene\n\n"
-        "This page is made from the table in `pfem/scene_keys.c`; `silt help KEY` prints the same.\n\n"
-        "A scene is a YAML 1.2 (or JSON) file. Units are SI, angles in degrees. Points have two numbers; a third one "
-        "must be 0.\nPhysical properties have no default, numerical ones have one. Of the keys marked \"one of\" "
-        "exactly one is given per item.\nFiles are CSV files beside the scene: `#` comments, a header with names, "
-        "numbers.\n`-D path=value` replaces or adds a key from the command line; list items by number or by their "
-        "name:\n`-D fluid.size=0.01`, `-D bodies.0.density=700`, `-D bodies.temple.density=700`.\n\n");
-    help_section(to, &silt_scene_keys, "", false);
+        "\n## Formulas\n\n"
+        "With X = x - centre and Y = y - centre (3-D: z - centre); components along x and up; `vector` is added to "
+        "all.\n\n"
+        "| formula | field |\n|---|---|\n"
+        "| solid-rotation | rate about the centre, counter-clockwise; 3-D: right-handed about `axis` |\n"
+        "| shear, strain | (rate Y, 0); (-rate X, rate Y) |\n"
+        "| taylor-green | amplitude (sin(pi X/length) cos(pi Y/length), -cos(pi X/length) sin(pi Y/length)) |\n"
+        "| standing-wave | linear wave over a flat bed at Y = 0 whose surface is flat and rises as amplitude omega "
+        "cos(2 pi X/length), omega^2 = g k tanh(k depth) |\n"
+        "| solitary-wave | potential flow over a flat bed at Y = 0 under the surface depth (1 + s(X)), e = "
+        "amplitude/depth, S = sech^2(k X), T = 1 - S. boussinesq: s = e S, k depth = sqrt(3 e/4), c^2 = g depth (1 + "
+        "e). grimshaw: s = e S - 3/4 e^2 S T + e^3 (5/8 S T - 101/80 S^2 T), k depth = sqrt(3 e/4) (1 - 5/8 e + "
+        "71/128 e^2), c^2 = g depth (1 + e - e^2/20 - 3/70 e^3). A region's `outline` gives the surface |\n"
+        "| field | the values of a point at the point, linear on the Delaunay cells between points, the plane "
+        "through the nearest ones beside the cloud |\n"
+        "| central | -rate \\|rate\\| (X, Y), 3-D: from the point or from `axis` |\n"
+        "| series | x, y (z) of the file at the time, linear between rows, constant outside |\n");
 }

@@ -11,12 +11,28 @@
 #define NOT_NEGATIVE              .low = 0, .high = HUGE_VAL
 #define ONLY(kind)                (1u << (kind))
 #define TABLE(name_, what_, type, selector_)                                                                           \
-    static const silt_key_table name_##_table = {what_, sizeof(type), name_##_rows, selector_}
+    static const silt_key_table name_##_table = {what_, sizeof(type), name_##_rows, selector_, false}
 
 static const silt_word scheme_words[] = {{"implicit", SCHEME_IMPLICIT}, {"fractional", SCHEME_FRACTIONAL}, {0}};
 static const silt_word pressure_words[] = {{"consistent", PRESSURE_CONSISTENT}, {"laplacian", PRESSURE_LAPLACIAN}, {0}};
 static const silt_word condition_words[] = {
     {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
+static const silt_word wall_condition_words[] = {
+    {"default", WALL_DEFAULT}, {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
+static const silt_word flow_words[] = {{"turbulent", FLOW_TURBULENT}, {"laminar", FLOW_LAMINAR}, {0}};
+static const silt_word turbulence_words[] = {{"auto", TURBULENCE_AUTO},
+                                             {"none", TURBULENCE_NONE},
+                                             {"mixing-length", TURBULENCE_MIXING_LENGTH},
+                                             {"smagorinsky", TURBULENCE_SMAGORINSKY},
+                                             {"wale", TURBULENCE_WALE},
+                                             {0}};
+static const silt_word rheology_words[] = {{"newtonian", RHEOLOGY_NEWTONIAN},
+                                           {"bingham", RHEOLOGY_BINGHAM},
+                                           {"herschel-bulkley", RHEOLOGY_HERSCHEL_BULKLEY},
+                                           {0}};
+static const silt_word near_words[] = {{"region", NEAR_REGION}, {"walls", NEAR_WALLS},     {"bed", NEAR_BED},
+                                       {"bodies", NEAR_BODIES}, {"surface", NEAR_SURFACE}, {0}};
+static const silt_word axis_words[] = {{"none", 0}, {"x", 1}, {"y", 2}, {"z", 3}, {0}};
 static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, {"dissipation", BED_DISSIPATION}, {0}};
 static const silt_word drag_words[] = {
     {"none", DRAG_NONE}, {"schiller-naumann", DRAG_SCHILLER_NAUMANN}, {"di-felice", DRAG_DI_FELICE}, {0}};
@@ -25,16 +41,40 @@ static const silt_word shape_words[] = {
 static const silt_word motion_words[] = {{"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {0}};
 static const silt_word front_words[] = {{"x", 1}, {"-x", -1}, {0}};
 static const silt_word norm_words[] = {{"l2", NORM_L2}, {"max", NORM_MAX}, {0}};
-static const silt_word scalar_words[] = {
-    {"none", SCALAR_NONE}, {"max", SCALAR_MAX},       {"min", SCALAR_MIN},     {"last", SCALAR_LAST},
-    {"mean", SCALAR_MEAN}, {"period", SCALAR_PERIOD}, {"slope", SCALAR_SLOPE}, {0}};
+static const silt_word scalar_words[] = {{"none", SCALAR_NONE},
+                                         {"max", SCALAR_MAX},
+                                         {"min", SCALAR_MIN},
+                                         {"last", SCALAR_LAST},
+                                         {"mean", SCALAR_MEAN},
+                                         {"period", SCALAR_PERIOD},
+                                         {"slope", SCALAR_SLOPE},
+                                         {"at", SCALAR_AT},
+                                         {"reaches", SCALAR_REACHES},
+                                         {"amplitude", SCALAR_AMPLITUDE},
+                                         {"decay", SCALAR_DECAY},
+                                         {0}};
+static const silt_word extent_words[] = {{"x", 0}, {"y", 1}, {"z", 2}, {0}};
+static const silt_word water_words[] = {{"water", 1}, {0}};
+static const silt_word check_profile_words[] = {{"surface", PROFILE_SURFACE},
+                                          {"velocity_x", PROFILE_VELOCITY_X},
+                                          {"velocity_y", PROFILE_VELOCITY_Y},
+                                          {"velocity_z", PROFILE_VELOCITY_Z},
+                                          {"speed", PROFILE_SPEED},
+                                          {"pressure", PROFILE_PRESSURE},
+                                          {0}};
 static const silt_word formula_words[] = {{"uniform", FORMULA_UNIFORM},
                                           {"solid-rotation", FORMULA_SOLID_ROTATION},
                                           {"shear", FORMULA_SHEAR},
                                           {"strain", FORMULA_STRAIN},
                                           {"taylor-green", FORMULA_TAYLOR_GREEN},
                                           {"standing-wave", FORMULA_STANDING_WAVE},
+                                          {"solitary-wave", FORMULA_SOLITARY_WAVE},
+                                          {"field", FORMULA_FIELD},
                                           {0}};
+static const silt_word wave_words[] = {{"boussinesq", WAVE_BOUSSINESQ}, {"grimshaw", WAVE_GRIMSHAW}, {0}};
+static const silt_word force_words[] = {{"uniform", FORMULA_UNIFORM}, {"solid-rotation", FORMULA_SOLID_ROTATION},
+                                        {"central", FORMULA_CENTRAL}, {"series", FORMULA_SERIES},
+                                        {"field", FORMULA_FIELD},     {0}};
 
 static const silt_key time_rows[] = {
     {"end", KEY_NUMBER, .unit = "s", POSITIVE, AT(silt_scene, time.end), .doc = "simulated time"},
@@ -51,57 +91,148 @@ static const silt_key time_rows[] = {
     {0}};
 TABLE(time, "the time block", silt_scene, -1);
 
-static const silt_key region_rows[] = {{"box", KEY_BOX, .unit = "m", .flags = KEY_CHOICE, .select = REGION_BOX,
-                                        AT(silt_region, lo), .doc = "two opposite corners, the lower left one first"},
-                                       {"polygon", KEY_POLYGON, .unit = "m", .flags = KEY_CHOICE,
-                                        .select = REGION_POLYGON, MANY(silt_region, n_point, point),
-                                        .doc = "corners in either sense; it closes by itself"},
-                                       {"circle", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = REGION_CIRCLE,
-                                        AT(silt_region, centre), .doc = "centre of a circle"},
-                                       {"radius", KEY_NUMBER, .unit = "m", POSITIVE, .when = ONLY(REGION_CIRCLE),
-                                        AT(silt_region, radius), .doc = "of the circle"},
-                                       {0}};
+// regions stand in lists of their own, and in the items of fluid.sizes
+#define REGION_ROWS(type, at)                                                                                          \
+    {"box",                                                                                                            \
+     KEY_BOX,                                                                                                          \
+     .unit = "m",                                                                                                      \
+     .flags = KEY_CHOICE,                                                                                              \
+     .select = REGION_BOX,                                                                                             \
+     AT(type, at lo),                                                                                                  \
+     .doc = "two opposite corners, the lower left one first"},                                                         \
+        {"polygon",                                                                                                    \
+         KEY_POLYGON,                                                                                                  \
+         .unit = "m",                                                                                                  \
+         .flags = KEY_CHOICE,                                                                                          \
+         .select = REGION_POLYGON,                                                                                     \
+         MANY(type, at n_point, at point),                                                                             \
+         .presence = ABSENT_TEXT,                                                                                      \
+         .present = offsetof(type, at outline),                                                                        \
+         .doc = "corners in either sense; it closes by itself; in 3-D corners [x, z] of an upright prism"},            \
+        {"outline",                                                                                                    \
+         KEY_FILE,                                                                                                     \
+         .flags = KEY_CHOICE,                                                                                          \
+         .select = REGION_POLYGON,                                                                                     \
+         AT(type, at outline),                                                                                         \
+         .doc = "CSV file beside the scene with the polygon's corners, columns x, y (3-D: x, z)"},                     \
+        {"circle",                                                                                                     \
+         KEY_POINT,                                                                                                    \
+         .unit = "m",                                                                                                  \
+         .flags = KEY_CHOICE | KEY_PLANE,                                                                              \
+         .select = REGION_CIRCLE,                                                                                      \
+         AT(type, at centre),                                                                                          \
+         .doc = "centre of a circle"},                                                                                 \
+        {"sphere",                                                                                                     \
+         KEY_POINT,                                                                                                    \
+         .unit = "m",                                                                                                  \
+         .flags = KEY_CHOICE | KEY_SPACE,                                                                              \
+         .select = REGION_SPHERE,                                                                                      \
+         AT(type, at centre),                                                                                          \
+         .doc = "centre of a sphere"},                                                                                 \
+        {"radius",                                                                                                     \
+         KEY_NUMBER,                                                                                                   \
+         .unit = "m",                                                                                                  \
+         POSITIVE,                                                                                                     \
+         .when = ONLY(REGION_CIRCLE) | ONLY(REGION_SPHERE),                                                            \
+         AT(type, at radius),                                                                                          \
+         .doc = "of the circle or sphere"},                                                                            \
+    {                                                                                                                  \
+        "across", KEY_ACROSS, .unit = "m", .flags = KEY_SPACE, .when = ONLY(REGION_POLYGON), AT(type, at lo),          \
+                              .doc = "from which y to which y the polygon's prism reaches"                             \
+    }
+
+static const silt_key region_rows[] = {REGION_ROWS(silt_region, ), {0}};
 TABLE(region, "a region", silt_region, offsetof(silt_region, kind));
 
 static const silt_key inlet_rows[] = {
     {"name", KEY_NAME, AT(silt_inlet, name), .doc = "different from all other inlets and outlets"},
     {"from", KEY_POINT, .unit = "m", AT(silt_inlet, from), .doc = "start of the segment, the water on its left"},
     {"to", KEY_POINT, .unit = "m", AT(silt_inlet, to), .doc = "end of the segment"},
-    {"velocity", KEY_POINT, .unit = "m/s", AT(silt_inlet, velocity), .doc = "of the water that comes in"},
-    {"series", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_inlet, series),
+    {"velocity", KEY_POINT, .unit = "m/s", .flags = KEY_CHOICE, .select = INLET_VELOCITY, AT(silt_inlet, velocity),
+     .doc = "of the water that comes in"},
+    {"head", KEY_SERIES, .flags = KEY_CHOICE, .select = INLET_HEAD, AT(silt_inlet, head),
+     .doc =
+         "CSV file beside the scene: time in s, water level in m behind the inlet, whose pressure drives the water in"},
+    {"series", KEY_SERIES, .flags = KEY_OPTIONAL, .when = ONLY(INLET_VELOCITY), AT(silt_inlet, series),
      .doc = "CSV file beside the scene: time in s, factor on the velocity"},
     {0}};
-TABLE(inlet, "an inlet", silt_inlet, -1);
+TABLE(inlet, "an inlet", silt_inlet, offsetof(silt_inlet, drive));
 
 static const silt_key outlet_rows[] = {
     {"name", KEY_NAME, AT(silt_outlet, name), .doc = "different from all other inlets and outlets"},
     {"from", KEY_POINT, .unit = "m", AT(silt_outlet, from), .doc = "start of the segment"},
     {"to", KEY_POINT, .unit = "m", AT(silt_outlet, to),
      .doc = "end of the segment; what crosses it from its left to its right leaves"},
+    {"level", KEY_NUMBER, .unit = "m", .fallback = ".nan", AT(silt_outlet, level),
+     .doc = "water level that is kept behind it; without it the water falls out freely"},
     {0}};
 TABLE(outlet, "an outlet", silt_outlet, -1);
 
 enum {
     FORMULA_WITH_RATE = ONLY(FORMULA_SOLID_ROTATION) | ONLY(FORMULA_SHEAR) | ONLY(FORMULA_STRAIN),
     FORMULA_WITH_LENGTH = ONLY(FORMULA_TAYLOR_GREEN) | ONLY(FORMULA_STANDING_WAVE),
+    FORMULA_WITH_DEPTH = ONLY(FORMULA_STANDING_WAVE) | ONLY(FORMULA_SOLITARY_WAVE),
 };
 static const silt_key formula_rows[] = {
     {"formula", KEY_WORD, .flags = KEY_SELECTOR, .words = formula_words, AT(silt_formula, kind),
-     .doc = "named velocity field at the start"},
-    {"vector", KEY_POINT, .unit = "m/s", .when = ONLY(FORMULA_UNIFORM), AT(silt_formula, vector),
-     .doc = "the velocity"},
+     .doc = "named velocity field at the start, in 3-D in the plane x-z"},
+    {"vector", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_formula, vector),
+     .doc = "added to what the formula gives; with uniform it is all"},
     {"rate", KEY_NUMBER, .unit = "1/s", .when = FORMULA_WITH_RATE, AT(silt_formula, rate),
      .doc = "angular velocity, shear u = rate y, or strain u = -rate x, v = rate y, about the centre"},
-    {"amplitude", KEY_NUMBER, .unit = "m/s or m", .when = FORMULA_WITH_LENGTH, AT(silt_formula, amplitude),
-     .doc = "largest velocity of the Taylor-Green cell, height of the standing wave"},
+    {"axis", KEY_WORD, .fallback = "z", .flags = KEY_SPACE, .words = axis_words + 1,
+     .when = ONLY(FORMULA_SOLID_ROTATION), AT(silt_formula, axis), .doc = "what the rotation is right-handed about"},
+    {"amplitude", KEY_NUMBER, .unit = "m/s or m", .when = FORMULA_WITH_LENGTH | ONLY(FORMULA_SOLITARY_WAVE),
+     AT(silt_formula, amplitude),
+     .doc = "largest velocity of the Taylor-Green cell, height of the wave over still water"},
     {"length", KEY_NUMBER, .unit = "m", POSITIVE, .when = FORMULA_WITH_LENGTH, AT(silt_formula, length),
      .doc = "width of the Taylor-Green cell, wavelength of the standing wave"},
-    {"depth", KEY_NUMBER, .unit = "m", POSITIVE, .when = ONLY(FORMULA_STANDING_WAVE), AT(silt_formula, depth),
-     .doc = "of the water under the standing wave"},
-    {"centre", KEY_POINT, .unit = "m", .fallback = "[0, 0]", .when = FORMULA_WITH_RATE | FORMULA_WITH_LENGTH,
-     AT(silt_formula, centre), .doc = "centre; corner of the Taylor-Green cell; bed below the first crest of the wave"},
+    {"depth", KEY_NUMBER, .unit = "m", POSITIVE, .when = FORMULA_WITH_DEPTH, AT(silt_formula, depth),
+     .doc = "of the still water under the wave"},
+    {"profile", KEY_WORD, .fallback = "grimshaw", .words = wave_words, .when = ONLY(FORMULA_SOLITARY_WAVE),
+     AT(silt_formula, profile),
+     .doc = "of the solitary wave: amplitude times sech^2(k x), k^2 = 0.75 amplitude/depth^3, or to third order in "
+            "amplitude/depth; the surface itself is given by a region, see outline"},
+    {"direction", KEY_SIGN, .fallback = "x", .words = front_words, .when = ONLY(FORMULA_SOLITARY_WAVE),
+     AT(silt_formula, rate), .doc = "where the solitary wave runs"},
+    {"centre", KEY_POINT, .unit = "m", .fallback = "[0, 0]",
+     .when = FORMULA_WITH_RATE | FORMULA_WITH_LENGTH | FORMULA_WITH_DEPTH, AT(silt_formula, centre),
+     .doc = "centre; corner of the Taylor-Green cell; bed below the first crest of the wave"},
+    {"file", KEY_TABLE, .when = ONLY(FORMULA_FIELD), AT(silt_formula, series),
+     .doc = "CSV file beside the scene: points and velocities, columns x, y, vx, vy (3-D: z, vz too), linear between "
+            "them"},
     {0}};
 TABLE(formula, "an initial velocity", silt_formula, offsetof(silt_formula, kind));
+
+enum { FORCE_WITH_RATE = ONLY(FORMULA_SOLID_ROTATION) | ONLY(FORMULA_CENTRAL) };
+static const silt_key force_rows[] = {
+    {"formula", KEY_WORD, .flags = KEY_SELECTOR, .words = force_words, AT(silt_formula, kind),
+     .doc = "named field of acceleration"},
+    {"vector", KEY_POINT, .unit = "m/s2", .fallback = "[0, 0]", AT(silt_formula, vector),
+     .doc = "added to what the formula gives; with uniform it is all"},
+    {"rate", KEY_NUMBER, .unit = "1/s2 or 1/s", .when = FORCE_WITH_RATE, AT(silt_formula, rate),
+     .doc = "angular acceleration of the rotation; central: -rate |rate| (x - centre), so a negative rate drives "
+            "outwards"},
+    {"axis", KEY_WORD, .fallback = "none", .flags = KEY_SPACE, .words = axis_words, .when = FORCE_WITH_RATE,
+     AT(silt_formula, axis), .doc = "what it turns or is central about; none: the point, for a rotation z"},
+    {"centre", KEY_POINT, .unit = "m", .fallback = "[0, 0]", .when = FORCE_WITH_RATE, AT(silt_formula, centre),
+     .doc = "where it is zero"},
+    {"file", KEY_TABLE, .when = ONLY(FORMULA_FIELD) | ONLY(FORMULA_SERIES), AT(silt_formula, series),
+     .doc = "CSV file beside the scene; series: time, x, y (3-D: z too), the same everywhere; field: points and "
+            "accelerations, columns x, y, vx, vy (3-D: z, vz too)"},
+    {0}};
+TABLE(force, "a body force", silt_formula, offsetof(silt_formula, kind));
+
+static const silt_key size_rows[] = {
+    {"near", KEY_WORD, .fallback = "region", .words = near_words, AT(silt_size_def, near),
+     .doc = "what the size belongs to: a region given here, walls, bed, bodies, the free surface"},
+    {"size", KEY_NUMBER, .unit = "m", POSITIVE, AT(silt_size_def, size), .doc = "distance between nodes there"},
+    {"distance", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_size_def, distance),
+     .doc = "how far around it the size holds"},
+    REGION_ROWS(silt_size_def, region.),
+    {0}};
+static const silt_key_table size_table = {"a size of nodes", sizeof(silt_size_def), size_rows,
+                                          offsetof(silt_size_def, region.kind), true};
 
 static const silt_key fluid_rows[] = {
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_fluid_def, density), .doc = "of the water"},
@@ -111,8 +242,24 @@ static const silt_key fluid_rows[] = {
      .doc = "momentum step: viscosity implicit, or fractional step"},
     {"pressure", KEY_WORD, .fallback = "consistent", .words = pressure_words, AT(silt_fluid_def, pressure),
      .doc = "operator of the pressure step"},
-    {"theta", KEY_NUMBER, .fallback = "0.55", RANGE(0.5, 1), AT(silt_fluid_def, theta),
-     .doc = "implicitness of the step: 0.5 trapezoidal, 1 backward Euler"},
+    {"flow", KEY_WORD, .fallback = "turbulent", .words = flow_words, AT(silt_fluid_def, flow),
+     .doc = "decides the defaults of turbulence and of the walls' condition"},
+    {"turbulence", KEY_WORD, .fallback = "auto", .words = turbulence_words, AT(silt_fluid_def, turbulence),
+     .doc = "model; auto: mixing-length in 2-D, wale in 3-D, none where the flow is laminar"},
+    {"wall_height", KEY_NUMBER, .unit = "h", .fallback = "2", .flags = KEY_OPEN_LOW, RANGE(0, 20),
+     AT(silt_fluid_def, wall_height), .doc = "distance from the wall at which the wall law samples the velocity"},
+    {"rheology", KEY_WORD, .fallback = "newtonian", .words = rheology_words, AT(silt_fluid_def, rheology),
+     .doc = "stress over shear rate: proportional; with a yield stress; yield stress and a power law"},
+    {"yield_stress", KEY_NUMBER, .unit = "Pa", .fallback = "0", NOT_NEGATIVE, AT(silt_fluid_def, yield_stress),
+     .doc = "of rheology: bingham, herschel-bulkley"},
+    {"flow_index", KEY_NUMBER, .fallback = "1", .flags = KEY_OPEN_LOW, RANGE(0, 3), AT(silt_fluid_def, flow_index),
+     .doc = "n of rheology: herschel-bulkley, stress = yield_stress + viscosity rate^n; viscosity then in Pa s^n"},
+    {"plastic_rate", KEY_NUMBER, .unit = "1/s", .fallback = "1e-3", POSITIVE, AT(silt_fluid_def, plastic_rate),
+     .doc = "shear rate below which the yield stress is smoothed, so that the viscosity stays finite"},
+    {"order", KEY_INTEGER, .fallback = "2", RANGE(1, 2), AT(silt_fluid_def, order),
+     .doc = "in time: 2 trapezoidal, 1 backward Euler"},
+    {"theta", KEY_NUMBER, .fallback = "0", RANGE(0, 1), AT(silt_fluid_def, theta),
+     .doc = "implicitness of the step, 0.5 trapezoidal to 1 backward Euler; 0: what `order` says"},
     {"alpha", KEY_NUMBER, .unit = "h", .fallback = "1.3", .flags = KEY_OPEN_LOW, RANGE(0, 10),
      AT(silt_fluid_def, alpha), .doc = "largest circumradius of a cell that was water a step ago"},
     {"merge", KEY_NUMBER, .unit = "h", .fallback = "0.3", .flags = KEY_OPEN_LOW, RANGE(0, 10),
@@ -130,10 +277,27 @@ static const silt_key fluid_rows[] = {
     {"seed", KEY_INTEGER, .fallback = "1", RANGE(0, INT32_MAX), AT(silt_fluid_def, seed), .doc = "of that shift"},
     {"regions", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &region_table, MANY(silt_fluid_def, n_region, region),
      .doc = "where water is at the start"},
-    {"inlets", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &inlet_table, MANY(silt_fluid_def, n_inlet, inlet),
+    {"cloud", KEY_FILE, .flags = KEY_OPTIONAL, AT(silt_fluid_def, cloud),
+     .doc = "CSV file beside the scene with the first nodes of the water, columns x, y (3-D: z too), and vx, vy (vz) "
+            "if it "
+            "gives velocities; without it they stand regularly"},
+    {"shuffle", KEY_NUMBER, .unit = "h", .fallback = "0", RANGE(0, 0.5), AT(silt_fluid_def, shuffle),
+     .doc = "random shift of the nodes inside the water in every step: a test of remeshing"},
+    {"sizes", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &size_table, MANY(silt_fluid_def, n_size, size_at),
+     .doc = "where nodes stand closer or farther than `size`; the smallest counts"},
+    {"size_growth", KEY_NUMBER, .fallback = "0.3", .flags = KEY_OPEN_LOW, RANGE(0, 10), AT(silt_fluid_def, size_growth),
+     .doc = "largest change of the size per distance"},
+    {"air_pressure", KEY_NUMBER, .unit = "Pa", .fallback = "0", NOT_NEGATIVE, AT(silt_fluid_def, air_pressure),
+     .doc = "absolute, of the air that closed pockets hold when they close; 0: pockets have no pressure"},
+    {"air_exponent", KEY_NUMBER, .fallback = "1.4", RANGE(1, 2), AT(silt_fluid_def, air_exponent),
+     .doc = "of its compression; 1: isothermal, 1.4: adiabatic"},
+    {"body_force", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &force_table, .presence = PRESENT_WORD,
+     .present = offsetof(silt_fluid_def, force.kind), AT(silt_fluid_def, force),
+     .doc = "acceleration of the water besides gravity"},
+    {"inlets", KEY_LIST, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &inlet_table, MANY(silt_fluid_def, n_inlet, inlet),
      .doc = "where water comes in"},
-    {"outlets", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &outlet_table, MANY(silt_fluid_def, n_outlet, outlet),
-     .doc = "where water and grains leave"},
+    {"outlets", KEY_LIST, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &outlet_table,
+     MANY(silt_fluid_def, n_outlet, outlet), .doc = "where water and grains leave"},
     {"velocity", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &formula_table, .presence = PRESENT_WORD,
      .present = offsetof(silt_fluid_def, velocity.kind), AT(silt_fluid_def, velocity),
      .doc = "velocity at the start; at rest without it"},
@@ -141,17 +305,32 @@ static const silt_key fluid_rows[] = {
 TABLE(fluid, "the fluid block", silt_fluid_def, -1);
 
 static const silt_key wall_rows[] = {
-    {"polyline", KEY_CHAIN, .unit = "m", .flags = KEY_CHOICE, MANY(silt_wall, n_point, point),
+    {"polyline", KEY_CHAIN, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = WALL_POLYLINE,
+     MANY(silt_wall, n_point, point),
      .doc = "corners, the water on the left; a last point equal to the first closes it"},
-    {"box", KEY_OUTLINE, .unit = "m", .flags = KEY_CHOICE | KEY_SHORTHAND, MANY(silt_wall, n_point, point),
+    {"box", KEY_BOX, .unit = "m", .flags = KEY_CHOICE, .select = WALL_BOX, AT(silt_wall, lo),
      .doc = "closed box around the water, lower left corner first"},
-    {"closed", KEY_SWITCH, .fallback = "false", AT(silt_wall, closed), .doc = "the last point is joined to the first"},
-    {"condition", KEY_WORD, .fallback = "no-slip", .words = condition_words, AT(silt_wall, condition),
-     .doc = "of the water at the wall"},
+    {"surface", KEY_SURFACE, .flags = KEY_CHOICE | KEY_SPACE, .select = WALL_SURFACE, AT(silt_wall, surface),
+     .doc = "triangulated surface, normals into the water"},
+    {"closed", KEY_SWITCH, .fallback = "false", .flags = KEY_PLANE, .when = ONLY(WALL_POLYLINE) | ONLY(WALL_BOX),
+     AT(silt_wall, closed), .doc = "the last point is joined to the first"},
+    {"scale", KEY_NUMBER, .fallback = "1", .flags = KEY_OPEN_LOW | KEY_SPACE, .low = 0, .high = HUGE_VAL,
+     .when = ONLY(WALL_SURFACE), AT(silt_wall, scale), .doc = "what the file's coordinates are multiplied by to be m"},
+    {"inside_out", KEY_SWITCH, .fallback = "false", .flags = KEY_SPACE, .when = ONLY(WALL_SURFACE),
+     AT(silt_wall, inside_out), .doc = "the file's normals point out of the water"},
+    {"condition", KEY_WORD, .fallback = "default", .words = wall_condition_words, AT(silt_wall, condition),
+     .doc = "of the water at the wall; default: wall-law where fluid.flow is turbulent, no-slip where it is laminar"},
     {"roughness", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_wall, roughness),
      .doc = "equivalent sand roughness of the wall law; 0: smooth"},
+    {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_wall, velocity),
+     .doc = "of the wall's surface along itself, which stays where it is: a lid, a belt"},
+    {"motion", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_wall, motion),
+     .doc = "CSV file beside the scene: time in s, then any of x, y, z in m and angle in degrees from the place given "
+            "here, "
+            "columns by name; the angle turns from x to y (3-D: from x to z)"},
+    {"pivot", KEY_POINT, .unit = "m", .fallback = "[0, 0]", AT(silt_wall, pivot), .doc = "what the angle turns about"},
     {0}};
-TABLE(wall, "a wall", silt_wall, -1);
+TABLE(wall, "a wall", silt_wall, offsetof(silt_wall, form));
 
 static const silt_key bed_rows[] = {
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_bed_def, density), .doc = "of the grains' solid"},
@@ -240,20 +419,30 @@ static const silt_key gauge_rows[] = {
     {"name", KEY_NAME, AT(silt_gauge_def, name), .doc = "column of history.csv"},
     {"front", KEY_SIGN, .flags = KEY_CHOICE, .words = front_words, .select = GAUGE_FRONT, AT(silt_gauge_def, from),
      .doc = "foremost x of connected water to this side"},
-    {"height_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_HEIGHT, AT(silt_gauge_def, from),
-     .doc = "top of connected water at this x"},
+    {"height_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_HEIGHT, AT(silt_gauge_def, from),
+     .doc = "top of connected water at this x (3-D: [x, y])"},
     {"wetted_at", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_WETTED, AT(silt_gauge_def, from),
      .doc = "1 when water is there, else 0"},
     {"pressure_at", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_PRESSURE, AT(silt_gauge_def, from),
      .doc = "pressure there, Pa"},
     {"velocity_at", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_VELOCITY, AT(silt_gauge_def, from),
      .doc = "velocity there, columns NAME_x, NAME_y, NAME_z"},
-    {"discharge", KEY_SEGMENT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_DISCHARGE, AT(silt_gauge_def, from),
-     .doc = "flow through the segment from its left to its right, m2/s"},
-    {"bed_level_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_BED_LEVEL, AT(silt_gauge_def, from),
-     .doc = "height of the bed at this x"},
-    {"scour_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_SCOUR, AT(silt_gauge_def, from),
-     .doc = "how deep the bed lies under its level at the start, at this x"},
+    {"discharge", KEY_SEGMENT, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_DISCHARGE,
+     AT(silt_gauge_def, from), .doc = "flow through the segment from its left to its right, m2/s"},
+    {"bed_level_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_BED_LEVEL,
+     AT(silt_gauge_def, from), .doc = "height of the bed at this x"},
+    {"scour_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_SCOUR,
+     AT(silt_gauge_def, from), .doc = "how deep the bed lies under its level at the start, at this x"},
+    {"extent", KEY_SIGN, .flags = KEY_CHOICE, .words = extent_words, .select = GAUGE_EXTENT, AT(silt_gauge_def, from),
+     .doc = "length of connected water along this axis, m"},
+    {"force_on", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(0, INT32_MAX), .select = GAUGE_FORCE,
+     AT(silt_gauge_def, index),
+     .doc = "force of the water on this wall of the list, from 0; columns NAME_x, NAME_y, NAME_z, N"},
+    {"angular_momentum_about", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_ANGULAR,
+     AT(silt_gauge_def, from),
+     .doc = "of the water about this point, kg m2/s; in three dimensions columns NAME_x, NAME_y, NAME_z"},
+    {"centroid_of", KEY_SIGN, .flags = KEY_CHOICE, .words = water_words, .select = GAUGE_CENTROID,
+     AT(silt_gauge_def, from), .doc = "centre of mass of the water, columns NAME_x, NAME_y, NAME_z, m"},
     {0}};
 TABLE(gauge, "a gauge", silt_gauge_def, offsetof(silt_gauge_def, kind));
 
@@ -265,8 +454,13 @@ TABLE(where, "a row filter", silt_check_def, -1);
 
 static const silt_key check_rows[] = {
     {"name", KEY_NAME, AT(silt_check_def, name), .doc = "for the report"},
-    {"gauge", KEY_TEXT, .flags = KEY_CHOICE | KEY_SHORTHAND, AT(silt_check_def, column), .doc = "a gauge of the scene"},
-    {"column", KEY_TEXT, .flags = KEY_CHOICE, AT(silt_check_def, column), .doc = "a column of history.csv"},
+    {"gauge", KEY_TEXT, .flags = KEY_CHOICE | KEY_SHORTHAND, .select = CHECK_COLUMN, AT(silt_check_def, column),
+     .doc = "a gauge of the scene"},
+    {"column", KEY_TEXT, .flags = KEY_CHOICE, .select = CHECK_COLUMN, AT(silt_check_def, column),
+     .doc = "a column of history.csv"},
+    {"profile", KEY_WORD, .flags = KEY_CHOICE, .select = CHECK_PROFILE, .words = check_profile_words,
+     AT(silt_check_def, profile),
+     .doc = "along a line at the time `at`, from the frames; the surface is the top of connected water"},
     {"reference", KEY_FILE, .flags = KEY_OPTIONAL, AT(silt_check_def, reference), .doc = "CSV file beside the scene"},
     {"x", KEY_TEXT, .flags = KEY_OPTIONAL, AT(silt_check_def, x),
      .doc = "abscissa in the reference; default its first column"},
@@ -274,12 +468,20 @@ static const silt_key check_rows[] = {
      .doc = "ordinate in the reference; default its second column"},
     {"where", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &where_table, .presence = PRESENT_TEXT,
      .present = offsetof(silt_check_def, where_column), .doc = "which rows of the reference count; default all"},
-    {"time_scale", KEY_NUMBER, .fallback = "1", AT(silt_check_def, time_scale),
+    {"time_scale", KEY_NUMBER, .fallback = "1", .when = ONLY(CHECK_COLUMN), AT(silt_check_def, time_scale),
      .doc = "the abscissa is time_scale (time + time_shift)"},
-    {"time_shift", KEY_NUMBER, .unit = "s", .fallback = "0", AT(silt_check_def, time_shift), .doc = "see time_scale"},
-    {"scale", KEY_NUMBER, .fallback = "1", AT(silt_check_def, scale), .doc = "the ordinate is scale (column + shift)"},
+    {"time_shift", KEY_NUMBER, .unit = "s", .fallback = "0", .when = ONLY(CHECK_COLUMN), AT(silt_check_def, time_shift),
+     .doc = "see time_scale"},
+    {"place_scale", KEY_NUMBER, .fallback = "1", .when = ONLY(CHECK_PROFILE), AT(silt_check_def, place_scale),
+     .doc = "the abscissa is place_scale (place + place_shift)"},
+    {"place_shift", KEY_NUMBER, .unit = "m", .fallback = "0", .when = ONLY(CHECK_PROFILE),
+     AT(silt_check_def, place_shift), .doc = "see place_scale"},
+    {"line", KEY_SEGMENT, .unit = "m", .flags = KEY_OPTIONAL, .when = ONLY(CHECK_PROFILE), AT(silt_check_def, line),
+     .doc = "the place is the distance from its start; a surface is taken above it; default the x axis"},
+    {"scale", KEY_NUMBER, .fallback = "1", AT(silt_check_def, scale),
+     .doc = "the ordinate is scale (column + shift), or scale (profile + shift)"},
     {"shift", KEY_NUMBER, .fallback = "0", AT(silt_check_def, shift), .doc = "see scale"},
-    {"align", KEY_NUMBER, .fallback = ".nan", AT(silt_check_def, align),
+    {"align", KEY_NUMBER, .fallback = ".nan", .when = ONLY(CHECK_COLUMN), AT(silt_check_def, align),
      .doc = "the curve is shifted in time so that both have this ordinate at the same abscissa"},
     {"window", KEY_PAIR, .fallback = "[-.inf, .inf]", .flags = KEY_INFINITE, AT(silt_check_def, window),
      .doc = "part of the abscissa that counts"},
@@ -288,44 +490,54 @@ static const silt_key check_rows[] = {
     {"norm", KEY_WORD, .fallback = "l2", .words = norm_words, AT(silt_check_def, norm), .doc = "of the difference"},
     {"relative_to", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_check_def, relative_to),
      .doc = "what the difference is divided by; 0: the reference, point by point"},
-    {"scalar", KEY_WORD, .fallback = "none", .words = scalar_words, AT(silt_check_def, scalar),
-     .doc = "a number made of the column instead of a reference"},
+    {"scalar", KEY_WORD, .fallback = "none", .words = scalar_words, .when = ONLY(CHECK_COLUMN),
+     AT(silt_check_def, scalar), .doc = "a number made of the column instead of a reference"},
+    {"at", KEY_NUMBER, .fallback = ".nan", AT(silt_check_def, at),
+     .doc = "abscissa of the scalar `at`; time of a profile in s, between frames linear"},
+    {"level", KEY_NUMBER, .fallback = ".nan", .when = ONLY(CHECK_COLUMN), AT(silt_check_def, level),
+     .doc = "ordinate that the scalar `reaches` waits for, or that `period` counts crossings of (default the mean)"},
     {"value", KEY_NUMBER, .fallback = ".nan", AT(silt_check_def, value), .doc = "expected scalar"},
     {"range", KEY_PAIR, .fallback = ".nan", .flags = KEY_INFINITE, AT(silt_check_def, low),
      .doc = "allowed scalar, instead of value and tolerance"},
     {"tolerance", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_check_def, tolerance),
      .doc = "of the norm, or of the scalar relative to its value (absolute when that is 0)"},
     {0}};
-TABLE(check, "a check", silt_check_def, -1);
+TABLE(check, "a check", silt_check_def, offsetof(silt_check_def, kind));
 
 static const silt_key scene_rows[] = {
     {"silt", KEY_INTEGER, RANGE(1, 1), AT(silt_scene, version), .doc = "version of these keys"},
     {"title", KEY_TEXT, .fallback = "", AT(silt_scene, title), .doc = "one line about the scene"},
-    {"dimension", KEY_INTEGER, .fallback = "2", RANGE(2, 3), AT(silt_scene, dimension), .doc = "2 for now"},
+    {"dimension", KEY_INTEGER, .fallback = "2", RANGE(2, 3), AT(silt_scene, dimension),
+     .doc = "2: x and y, y up; 3: x, y and z, z up"},
+    {"periodic", KEY_PAIR, .unit = "m", .flags = KEY_OPTIONAL, AT(silt_scene, period),
+     .doc = "the scene repeats in x: what leaves at one end enters at the other"},
     {"time", KEY_BLOCK, .sub = &time_table, .doc = "how long, how often, how fine"},
-    {"gravity", KEY_POINT, .unit = "m/s2", AT(silt_scene, gravity), .doc = "acceleration, for example [0, -9.81]"},
+    {"gravity", KEY_POINT, .unit = "m/s2", AT(silt_scene, gravity),
+     .doc = "acceleration, for example [0, -9.81], in 3-D [0, 0, -9.81]"},
     {"fluid", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &fluid_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, fluid.on), AT(silt_scene, fluid), .doc = "the water"},
     {"walls", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &wall_table, MANY(silt_scene, n_wall, wall),
      .doc = "what holds it"},
-    {"bed", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &bed_table, .presence = PRESENT_FLAG,
+    {"bed", KEY_BLOCK, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &bed_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, bed.on), AT(silt_scene, bed), .doc = "ground that the water can erode"},
-    {"grains", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &grains_table, .presence = PRESENT_FLAG,
+    {"grains", KEY_BLOCK, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &grains_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, grains.on), AT(silt_scene, grains), .doc = "loose grains; needed with a bed"},
-    {"contact", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &contact_table, .presence = PRESENT_FLAG,
+    {"contact", KEY_BLOCK, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &contact_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, contact.on), AT(silt_scene, contact),
      .doc = "how solids touch; needed with a bed, grains or bodies"},
-    {"bodies", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &body_table, MANY(silt_scene, n_body, body),
+    {"bodies", KEY_LIST, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &body_table, MANY(silt_scene, n_body, body),
      .doc = "rigid objects"},
     {"gauges", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &gauge_table, MANY(silt_scene, n_gauge, gauge),
      .doc = "what is measured at every step"},
     {"checks", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &check_table, MANY(silt_scene, n_check, check),
      .doc = "what the result is held against"},
     {0}};
-const silt_key_table silt_scene_keys = {"the scene", sizeof(silt_scene), scene_rows, -1};
+const silt_key_table silt_scene_keys = {"the scene", sizeof(silt_scene), scene_rows, -1, false};
 
 _Static_assert(offsetof(silt_region, hi) == offsetof(silt_region, lo) + 3 * sizeof(double), "box: lo, hi");
+_Static_assert(offsetof(silt_wall, hi) == offsetof(silt_wall, lo) + 3 * sizeof(double), "box: lo, hi");
 _Static_assert(offsetof(silt_gauge_def, to) == offsetof(silt_gauge_def, from) + 3 * sizeof(double),
                "segment: from, to");
+_Static_assert(sizeof(silt_check_kind) == sizeof(int), "selectors are stored as int");
 _Static_assert(offsetof(silt_check_def, high) == offsetof(silt_check_def, low) + sizeof(double), "pair: low, high");
 _Static_assert(sizeof(silt_shape) == sizeof(int), "words are stored as int");

@@ -20,14 +20,17 @@ typedef enum {
     KEY_TEXT,       // char *
     KEY_NAME,       // char *, letters, digits, underscores
     KEY_FILE,       // char *, made absolute
-    KEY_SERIES,     // silt_series, read from a CSV
-    KEY_POINT,      // double[3], two or three numbers
+    KEY_SURFACE,    // char *, made absolute, a triangulated surface
+    KEY_SERIES,     // silt_series, read from a CSV over rising time
+    KEY_TABLE,      // silt_series, read from a CSV in any order
+    KEY_POINT,      // double[3], as many numbers as dimensions
+    KEY_PLACE,      // double[3], a place seen from above: a number in 2-D, [x, y] in 3-D
     KEY_PAIR,       // double[2]
+    KEY_ACROSS,     // double[6], a pair that goes to the second and the fifth
     KEY_SEGMENT,    // double[6], two different points
     KEY_BOX,        // double[6], two opposite corners, the lower first
     KEY_CHAIN,      // int at count, double * of 3 per point: at least 2 points
-    KEY_POLYGON,    // int at count, double * of 3 per point: at least 3 points, made counter-clockwise
-    KEY_OUTLINE,    // a box read as a KEY_CHAIN of its 4 corners
+    KEY_POLYGON,    // int at count, double * of 3 per point: at least 3 points [x, y] (3-D: [x, z]), made counter-clockwise
     KEY_BLOCK,      // mapping
     KEY_LIST,       // int at count, array of structs: sequence of mappings
 } silt_key_kind;
@@ -39,11 +42,19 @@ enum {
     KEY_CHOICE = 8,     // exactly one of the choices of its table is given; sets the selector to `select`
     KEY_SELECTOR = 16,  // its value is the selector of its table
     KEY_SHORTHAND = 32, // never written back: another key holds the same
-    KEY_OPTIONAL = 64,  // list or block that may be absent; text without default
+    KEY_OPTIONAL = 64,  // list, block or pair that may be absent; text without default
+    KEY_PLANE = 128,    // in two dimensions only
+    KEY_SPACE = 256,    // in three dimensions only
 };
 
 /** how to see in the struct whether a block was there */
-typedef enum { PRESENT_ALWAYS = 0, PRESENT_FLAG, PRESENT_WORD, PRESENT_TEXT } silt_presence;
+typedef enum {
+    PRESENT_ALWAYS = 0,
+    PRESENT_FLAG,
+    PRESENT_WORD,
+    PRESENT_TEXT,
+    ABSENT_TEXT, // a value, not a block: only where that text is not there, since the value was made from it
+} silt_presence;
 
 typedef struct silt_word {
     const char *text; // NULL ends the list
@@ -73,13 +84,18 @@ struct silt_key_table {
     size_t size;         // of the struct
     const silt_key *key; // ends with a row without name
     int selector;        // offset of an int that says which rows with `when` are used, -1: none
+    bool loose;          // none of its choices need be given
 };
 
 extern const silt_key_table silt_scene_keys;
 /** row of that name, or NULL */
 const silt_key *silt_key_find(const silt_key_table *table, const char *name);
 /** range, words or form of a key in words: "a number in m, > 0"; owned by the caller */
-char *silt_key_allowed(const silt_key *key);
+char *silt_key_allowed(const silt_key *key, int dimension);
+/** counts in a scene of that dimension (0: not known) */
+static inline bool silt_key_fits(const silt_key *key, int dimension) {
+    return !((key->flags & KEY_PLANE && dimension == 3) || (key->flags & KEY_SPACE && dimension == 2));
+}
 /** the nearest of the table's names, or NULL when none is near */
 const char *silt_key_nearest(const silt_key_table *table, const char *name);
 const char *silt_word_nearest(const silt_word *words, const char *text);
@@ -101,7 +117,7 @@ typedef struct silt_tree {
     struct silt_tree **item; // owned array, items owned by the reader
 } silt_tree;
 
-enum { SCENE_COMPLAINTS = 50, SCENE_DEPTH = 64, SCENE_NODES = 1000000, SCENE_BYTES = 8 << 20 };
+enum { SCENE_COMPLAINTS = 50, SCENE_DEPTH = 64, SCENE_NODES = 1000000, SCENE_BYTES = 8 << 20, SCENE_CORNERS = 20000 };
 
 typedef struct silt_source {
     char *name, *text; // owned
@@ -141,6 +157,13 @@ void silt_complain_key(silt_reader *reader, const silt_tree *node, const char *f
 silt_status silt_complaints_report(silt_reader *reader, silt_error *err);
 
 // checks over several keys, and writing ------------------------------------------------------------------
+/** What a polygon of the scene must be: no corner twice in a row, no crossing, some area; turned counter-clockwise. A
+ * complaint is made at the item of `corners` in question, or at `whole` where that is NULL; where: text before ", allowed".
+ * @return true when sound */
+bool silt_polygon_sound(silt_reader *reader, const silt_tree *whole, const silt_tree *corners, const char *path, int n,
+                        double *point);
+/** Reads the tables that the scene names and checks what they hold; settles the defaults that hang on other keys. */
+void silt_scene_settle(silt_reader *reader, silt_scene *scene);
 void silt_scene_check(silt_reader *reader, silt_scene *scene);
 /** the resolved scene as YAML; owned by the caller. names: files with their folder (true), or their last part only */
 char *silt_scene_text(const silt_scene *scene, bool folders);

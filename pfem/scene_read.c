@@ -42,7 +42,7 @@ static bool read_empty(const silt_tree *node) {
 // the common message; says a word about what often goes wrong
 static void read_refuse(read_state *state, const silt_tree *node, const silt_key *key, const char *path,
                         const char *hint) {
-    char *found = read_found(node), *allowed = silt_key_allowed(key);
+    char *found = read_found(node), *allowed = silt_key_allowed(key, state->scene->dimension);
     silt_complain(state->reader, node, "key '%s': found %s, allowed %s%s", path, found, allowed, hint);
     free(found);
     free(allowed);
@@ -90,25 +90,27 @@ static void read_integer(read_state *state, const silt_key *key, const silt_tree
         *(int *)value = (int)x;
 }
 
-// numbers in a list, two or three of them; a third coordinate must be 0
-static bool read_point(read_state *state, const silt_key *key, const silt_tree *node, const char *path, double *point) {
+// numbers in a list; in two dimensions a third one may stand there if it is 0
+static bool read_coordinates(read_state *state, const silt_key *key, const silt_tree *node, const char *path, int n,
+                             const char *form, double *point) {
     double x[3] = {0};
-    if (node->kind != TREE_LIST || node->n_item < 2 || node->n_item > 3) {
+    int most = state->scene->dimension == 3 ? n : 3;
+    const char *in = key->unit ? " in " : "", *unit = key->unit ? key->unit : "";
+    if (node->kind != TREE_LIST || node->n_item < n || node->n_item > most) {
         char *found = read_found(node);
-        silt_complain(state->reader, node, "key '%s': found %s, allowed a point [x, y]%s%s", path, found,
-                      key->unit ? " in " : "", key->unit ? key->unit : "");
+        silt_complain(state->reader, node, "key '%s': found %s, allowed a point %s%s%s", path, found, form, in, unit);
         free(found);
         return false;
     }
     for (int i = 0; i < node->n_item; i++)
         if (!read_plain_number(node->item[i], &x[i]) || !isfinite(x[i])) {
             char *found = read_found(node->item[i]);
-            silt_complain(state->reader, node->item[i], "key '%s': found %s, allowed a number%s%s", path, found,
-                          key->unit ? " in " : "", key->unit ? key->unit : "");
+            silt_complain(state->reader, node->item[i], "key '%s': found %s, allowed a number%s%s", path, found, in,
+                          unit);
             free(found);
             return false;
         }
-    if (x[2] != 0) {
+    if (n == 2 && x[2] != 0) {
         silt_complain(state->reader, node->item[2],
                       "key '%s': found the third coordinate %.10g, allowed 0 in two dimensions", path, x[2]);
         return false;
@@ -117,15 +119,30 @@ static bool read_point(read_state *state, const silt_key *key, const silt_tree *
     return true;
 }
 
-static void read_pair(read_state *state, const silt_key *key, const silt_tree *node, const char *path, double *pair) {
-    double x[2];
+static bool read_point(read_state *state, const silt_key *key, const silt_tree *node, const char *path, double *point) {
+    bool space = state->scene->dimension == 3;
+    return read_coordinates(state, key, node, path, space ? 3 : 2, space ? "[x, y, z]" : "[x, y]", point);
+}
+
+// seen from above: in 2-D a number
+static void read_place(read_state *state, const silt_key *key, const silt_tree *node, const char *path, double *place) {
+    if (state->scene->dimension == 3)
+        read_coordinates(state, key, node, path, 2, "[x, y] seen from above", place);
+    else
+        read_number(state, key, node, path, place);
+}
+
+static bool read_pair(read_state *state, const silt_key *key, const silt_tree *node, const char *path, double *pair) {
+    double x[2] = {0};
     bool sound = node->kind == TREE_LIST && node->n_item == 2;
     for (int i = 0; i < 2 && sound; i++)
         sound = read_plain_number(node->item[i], &x[i]) && read_in_range(key, x[i]);
-    if (!sound || !(x[0] < x[1]))
+    if (!sound || !(x[0] < x[1])) {
         read_refuse(state, node, key, path, "");
-    else
-        memcpy(pair, x, sizeof x);
+        return false;
+    }
+    memcpy(pair, x, sizeof x);
+    return true;
 }
 
 // two points: a segment, or the corners of a box
@@ -139,12 +156,18 @@ static bool read_two_points(read_state *state, const silt_key *key, const silt_t
     for (int i = 0; i < 2; i++)
         if (!read_point(state, key, node->item[i], path, x + 3 * i))
             return false;
-    bool box = key->kind != KEY_SEGMENT;
-    bool sound = box ? x[0] < x[3] && x[1] < x[4] : x[0] != x[3] || x[1] != x[4];
+    bool box = key->kind != KEY_SEGMENT, space = state->scene->dimension == 3;
+    bool sound =
+        box ? x[0] < x[3] && x[1] < x[4] && (!space || x[2] < x[5]) : x[0] != x[3] || x[1] != x[4] || x[2] != x[5];
     if (!sound) {
-        char *allowed = silt_key_allowed(key);
-        silt_complain(state->reader, node, "key '%s': found [[%.10g, %.10g], [%.10g, %.10g]], allowed %s", path, x[0],
-                      x[1], x[3], x[4], allowed);
+        char *allowed = silt_key_allowed(key, state->scene->dimension);
+        if (space)
+            silt_complain(state->reader, node,
+                          "key '%s': found [[%.10g, %.10g, %.10g], [%.10g, %.10g, %.10g]], allowed %s", path, x[0],
+                          x[1], x[2], x[3], x[4], x[5], allowed);
+        else
+            silt_complain(state->reader, node, "key '%s': found [[%.10g, %.10g], [%.10g, %.10g]], allowed %s", path,
+                          x[0], x[1], x[3], x[4], allowed);
         free(allowed);
         return false;
     }
@@ -153,74 +176,71 @@ static bool read_two_points(read_state *state, const silt_key *key, const silt_t
 }
 
 // a polygon or chain: no point twice in a row, no crossing, some area
-static void read_points(read_state *state, const silt_key *key, const silt_tree *node, const char *path, int *count,
-                        double **points) {
-    enum { MOST = 20000 };
-    bool polygon = key->kind == KEY_POLYGON;
-    int n = node->kind == TREE_LIST ? node->n_item : 0, crossing[2];
-    if (n < (polygon ? 3 : 2) || n > MOST) {
-        read_refuse(state, node, key, path, n > MOST ? "; at most 20000" : "");
-        return;
-    }
-    double *x = silt_alloc((size_t)n, 3 * sizeof *x);
-    for (int i = 0; i < n; i++) {
-        if (!read_point(state, key, node->item[i], path, x + 3 * i))
-            goto cleanup;
-        if (i > 0 && x[3 * i] == x[3 * i - 3] && x[3 * i + 1] == x[3 * i - 2]) {
-            silt_complain(state->reader, node->item[i],
+static bool read_sound(silt_reader *reader, const silt_tree *whole, const silt_tree *corners, const char *path,
+                       bool polygon, int n, double *x) {
+    int crossing[2];
+    for (int i = 1; i < n; i++)
+        if (x[3 * i] == x[3 * i - 3] && x[3 * i + 1] == x[3 * i - 2]) {
+            silt_complain(reader, corners ? corners->item[i] : whole,
                           "key '%s': found the point [%.10g, %.10g] twice in a row, allowed once", path, x[3 * i],
                           x[3 * i + 1]);
-            goto cleanup;
+            return false;
         }
-    }
     // a chain that comes back is closed
     bool back = x[0] == x[3 * n - 3] && x[1] == x[3 * n - 2];
     if (polygon && back) {
-        silt_complain(state->reader, node->item[n - 1],
+        silt_complain(reader, corners ? corners->item[n - 1] : whole,
                       "key '%s': found the first point again at the end, allowed once: a polygon closes by itself",
                       path);
-        goto cleanup;
+        return false;
     }
     if (polygon && silt_chain_straight(n, x)) {
-        silt_complain(state->reader, node, "key '%s': found a polygon without area, allowed one with area", path);
-        goto cleanup;
+        silt_complain(reader, whole, "key '%s': found a polygon without area, allowed one with area", path);
+        return false;
     }
     if (silt_chain_crosses(back ? n - 1 : n, x, polygon || back, crossing)) {
-        const silt_tree *at = node->item[crossing[1]];
-        silt_complain(state->reader, at,
-                      "key '%s': found edge %d (from here) meeting edge %d, allowed a %s that crosses or "
+        silt_complain(reader, corners ? corners->item[crossing[1]] : whole,
+                      "key '%s': found edge %d%s meeting edge %d, allowed a %s that crosses or "
                       "touches itself nowhere",
-                      path, crossing[1], crossing[0], polygon ? "polygon" : "polyline");
+                      path, crossing[1], corners ? " (from here)" : "", crossing[0], polygon ? "polygon" : "polyline");
+        return false;
+    }
+    // clockwise: turn it over, the first corner stays
+    bool turned = polygon && silt_polygon_area(n, x) < 0;
+    for (int i = 1, k = n - 1; turned && i < k; i++, k--)
+        for (int c = 0; c < 3; c++) {
+            double other = x[3 * i + c];
+            x[3 * i + c] = x[3 * k + c];
+            x[3 * k + c] = other;
+        }
+    return true;
+}
+
+bool silt_polygon_sound(silt_reader *reader, const silt_tree *whole, const silt_tree *corners, const char *path, int n,
+                        double *point) {
+    return read_sound(reader, whole, corners, path, true, n, point);
+}
+
+static void read_points(read_state *state, const silt_key *key, const silt_tree *node, const char *path, int *count,
+                        double **points) {
+    bool polygon = key->kind == KEY_POLYGON, space = state->scene->dimension == 3;
+    int n = node->kind == TREE_LIST ? node->n_item : 0;
+    if (n < (polygon ? 3 : 2) || n > SCENE_CORNERS) {
+        read_refuse(state, node, key, path, n > SCENE_CORNERS ? "; at most 20000" : "");
+        return;
+    }
+    double *x = silt_alloc((size_t)n, 3 * sizeof *x);
+    for (int i = 0; i < n; i++)
+        if (!read_coordinates(state, key, node->item[i], path, 2, space ? "[x, z]" : "[x, y]", x + 3 * i))
+            goto cleanup;
+    if (!read_sound(state->reader, node, node, path, polygon, n, x))
         goto cleanup;
-    }
-    if (polygon) {
-        double area = silt_polygon_area(n, x);
-        // clockwise: turn it over, the first corner stays
-        for (int i = 1, k = n - 1; area < 0 && i < k; i++, k--)
-            for (int c = 0; c < 3; c++) {
-                double other = x[3 * i + c];
-                x[3 * i + c] = x[3 * k + c];
-                x[3 * k + c] = other;
-            }
-    }
     free(*points);
     *points = x;
     *count = n;
     return;
 cleanup:
     free(x);
-}
-
-static void read_outline(read_state *state, const silt_key *key, const silt_tree *node, const char *path, int *count,
-                         double **points) {
-    double x[6];
-    if (!read_two_points(state, key, node, path, x))
-        return;
-    const double corner[12] = {x[0], x[1], 0, x[3], x[1], 0, x[3], x[4], 0, x[0], x[4], 0};
-    free(*points);
-    *points = silt_alloc(12, sizeof(double));
-    memcpy(*points, corner, sizeof corner);
-    *count = 4;
 }
 
 // words and texts --------------------------------------------------------------------------------------
@@ -276,13 +296,14 @@ static char *read_file_name(const char *folder, const char *name, const char *pa
 }
 
 static void read_text(read_state *state, const silt_key *key, const silt_tree *node, const char *path, char **value) {
+    bool file = key->kind == KEY_FILE || key->kind == KEY_SURFACE;
     bool plain = node->kind == TREE_SCALAR && (!read_empty(node) || key->fallback);
-    if (!plain || (key->kind == KEY_NAME && !read_is_name(node->text)) || (key->kind == KEY_FILE && !*node->text)) {
+    if (!plain || (key->kind == KEY_NAME && !read_is_name(node->text)) || (file && !*node->text)) {
         read_refuse(state, node, key, path, key->kind == KEY_NAME && plain ? ", 40 characters at most" : "");
         return;
     }
     free(*value);
-    if (key->kind == KEY_FILE)
+    if (file)
         *value = read_file_name(state->reader->folder, node->text, path);
     else
         *value = silt_text("%s", read_empty(node) ? "" : node->text);
@@ -297,12 +318,11 @@ static void read_series(read_state *state, const silt_key *key, const silt_tree 
         return;
     silt_series_clear(value);
     silt_status status = silt_series_read(NULL, file, value, &err);
-    if (status == SILT_OK)
+    if (status == SILT_OK && key->kind == KEY_SERIES)
         status = silt_series_rising(value, &err);
     if (status != SILT_OK) {
-        silt_complain(state->reader, node,
-                      "key '%s': found a file that cannot serve, allowed a CSV table over rising time: %s", path,
-                      err.text);
+        silt_complain(state->reader, node, "key '%s': found a file that cannot serve, allowed a CSV table%s: %s", path,
+                      key->kind == KEY_SERIES ? " over rising time" : "", err.text);
         silt_series_clear(value);
     }
     free(file);
@@ -352,17 +372,30 @@ static void read_row(read_state *state, const silt_key_table *table, const silt_
     case KEY_TEXT:
     case KEY_NAME:
     case KEY_FILE:
+    case KEY_SURFACE:
         read_text(state, key, node, path, at);
         break;
     case KEY_SERIES:
+    case KEY_TABLE:
         read_series(state, key, node, path, at);
         break;
     case KEY_POINT:
         read_point(state, key, node, path, at);
         break;
+    case KEY_PLACE:
+        read_place(state, key, node, path, at);
+        break;
     case KEY_PAIR:
         read_pair(state, key, node, path, at);
         break;
+    case KEY_ACROSS: {
+        double pair[2], *box = at;
+        if (read_pair(state, key, node, path, pair)) {
+            box[1] = pair[0];
+            box[4] = pair[1];
+        }
+        break;
+    }
     case KEY_SEGMENT:
     case KEY_BOX:
         read_two_points(state, key, node, path, at);
@@ -370,9 +403,6 @@ static void read_row(read_state *state, const silt_key_table *table, const silt_
     case KEY_CHAIN:
     case KEY_POLYGON:
         read_points(state, key, node, path, count, at);
-        break;
-    case KEY_OUTLINE:
-        read_outline(state, key, node, path, count, at);
         break;
     case KEY_BLOCK:
         if (key->presence == PRESENT_FLAG && node->kind == TREE_MAPPING)
@@ -397,7 +427,7 @@ static void read_default(read_state *state, const silt_key *key, void *base, con
     if (key->flags & (KEY_CHOICE | KEY_OPTIONAL))
         return;
     if (!text) {
-        char *allowed = silt_key_allowed(key);
+        char *allowed = silt_key_allowed(key, state->scene->dimension);
         silt_complain_key(state->reader, node, "key '%s': found nothing in this block, allowed %s", path, allowed);
         free(allowed);
         return;
@@ -435,6 +465,11 @@ static void read_default(read_state *state, const silt_key *key, void *base, con
             if (strcmp(word->text, text) == 0)
                 memcpy(at, &word->value, sizeof word->value);
         break;
+    case KEY_SIGN:
+        for (const silt_word *word = key->words; word->text; word++)
+            if (strcmp(word->text, text) == 0)
+                *(double *)at = word->value;
+        break;
     case KEY_TEXT:
         *(char **)at = silt_text("%s", text);
         break;
@@ -459,8 +494,12 @@ static void read_unknown(read_state *state, const silt_key_table *table, const s
         fprintf(to, "did you mean '%s'?", nearest);
     } else {
         fprintf(to, "allowed in %s: ", table->what);
+        const char *between = "";
         for (const silt_key *key = table->key; key->name; key++)
-            fprintf(to, "%s%s", key == table->key ? "" : ", ", key->name);
+            if (silt_key_fits(key, state->scene->dimension)) {
+                fprintf(to, "%s%s", between, key->name);
+                between = ", ";
+            }
     }
     fclose(to);
     silt_complain_key(state->reader, item, "%s", text);
@@ -476,7 +515,7 @@ static void read_unused(read_state *state, const silt_key_table *table, const si
     if (!to)
         return;
     for (const silt_key *row = table->key; row->name; row++) {
-        if (row->flags & KEY_CHOICE && key->when >> row->select & 1)
+        if (row->flags & KEY_CHOICE && key->when >> row->select & 1 && silt_key_fits(row, state->scene->dimension))
             fprintf(to, " %s", row->name);
         for (const silt_word *word = row->flags & KEY_SELECTOR ? row->words : NULL; word && word->text; word++)
             if (key->when >> word->value & 1)
@@ -485,6 +524,30 @@ static void read_unused(read_state *state, const silt_key_table *table, const si
     fclose(to);
     silt_complain_key(state->reader, item, "key '%s': found it without what it belongs to, allowed only with%s", path,
                       text);
+    free(text);
+}
+
+// a key of the plane in space, or the other way round
+static void read_misplaced(read_state *state, const silt_key_table *table, const silt_key *key, const silt_tree *item,
+                           const char *path) {
+    const char *here = state->scene->dimension == 3 ? "three" : "two";
+    char *text = NULL;
+    size_t size = 0;
+    FILE *to = open_memstream(&text, &size);
+    if (!to)
+        return;
+    if (key->flags & KEY_CHOICE) {
+        const char *between = "allowed there: ";
+        for (const silt_key *row = table->key; row->name; row++)
+            if (row->flags & KEY_CHOICE && silt_key_fits(row, state->scene->dimension)) {
+                fprintf(to, "%s%s", between, row->name);
+                between = ", ";
+            }
+    } else {
+        fprintf(to, "allowed in %s only", key->flags & KEY_PLANE ? "two" : "three");
+    }
+    fclose(to);
+    silt_complain_key(state->reader, item, "key '%s': found it in a scene of %s dimensions, %s", path, here, text);
     free(text);
 }
 
@@ -503,7 +566,8 @@ static void read_choices(read_state *state, const silt_key_table *table, const s
     for (int i = 0; table->key[i].name; i++) {
         if (!(table->key[i].flags & KEY_CHOICE))
             continue;
-        fprintf(to, "%s%s", n_choice++ ? ", " : "", table->key[i].name);
+        if (silt_key_fits(&table->key[i], state->scene->dimension))
+            fprintf(to, "%s%s", n_choice++ ? ", " : "", table->key[i].name);
         misspelt |= meant[i];
         if (given[i] && first)
             silt_complain_key(state->reader, given[i], "key '%s.%s': found it beside '%s', allowed only one of them",
@@ -514,14 +578,14 @@ static void read_choices(read_state *state, const silt_key_table *table, const s
         }
     }
     fclose(to);
-    if (n_choice && !first && !misspelt)
+    if (n_choice && !first && !misspelt && !table->loose)
         silt_complain(state->reader, node, "key '%s': found none of its forms, allowed exactly one of: %s", path, text);
     free(text);
 }
 
 static void read_table(read_state *state, const silt_key_table *table, void *base, const silt_tree *node,
                        const char *path) {
-    enum { MOST_ROWS = 32 };
+    enum { MOST_ROWS = 64 };
     const silt_tree *given[MOST_ROWS] = {0};
     bool meant[MOST_ROWS] = {0};
     int n_row = 0;
@@ -563,11 +627,15 @@ static void read_table(read_state *state, const silt_key_table *table, void *bas
                 memcpy(&kind, (char *)base + table->selector, sizeof kind);
             bool used = !key->when || (key->when >> kind & 1);
             char *below = silt_text("%s%s%s", path, *path ? "." : "", key->name);
-            if (given[i] && used)
+            if (!silt_key_fits(key, state->scene->dimension)) {
+                if (given[i])
+                    read_misplaced(state, table, key, given[i], below);
+            } else if (given[i] && used)
                 read_row(state, table, key, base, given[i], below);
             else if (given[i] && kind)
                 read_unused(state, table, key, given[i], below);
-            else if (!given[i] && used && !(meant[i] && !key->fallback))
+            else if (!given[i] && used && !(meant[i] && !key->fallback) &&
+                     !(key->flags & KEY_SPACE && state->scene->dimension != 3))
                 read_default(state, key, base, node, below);
             free(below);
         }
@@ -607,13 +675,14 @@ static void read_free(const silt_key_table *table, void *base) {
         case KEY_TEXT:
         case KEY_NAME:
         case KEY_FILE:
+        case KEY_SURFACE:
         case KEY_CHAIN:
         case KEY_POLYGON:
-        case KEY_OUTLINE:
             free(*(void **)at);
             *(void **)at = NULL;
             break;
         case KEY_SERIES:
+        case KEY_TABLE:
             silt_series_clear(at);
             break;
         case KEY_BLOCK:
@@ -628,6 +697,8 @@ static void read_free(const silt_key_table *table, void *base) {
 void silt_scene_free(silt_scene **scene) {
     if (!scene || !*scene)
         return;
+    silt_formula_clear(&(*scene)->fluid.velocity);
+    silt_formula_clear(&(*scene)->fluid.force);
     read_free(&silt_scene_keys, *scene);
     free((*scene)->path);
     free((*scene)->folder);
@@ -636,16 +707,48 @@ void silt_scene_free(silt_scene **scene) {
     *scene = NULL;
 }
 
-// hash of the resolved text without folders, and of the numbers in its series
+// numbers of the tables and bytes of the files that the water's start and its walls are made from
+static uint64_t read_hash_series(uint64_t hash, const silt_series *series) {
+    return silt_hash(hash, series->value, (size_t)series->n_row * (size_t)series->n_column * sizeof *series->value);
+}
+
+static uint64_t read_hash_file(uint64_t hash, const char *path) {
+    char block[1 << 14];
+    FILE *file = path ? fopen(path, "rb") : NULL;
+    for (size_t n; file && (n = fread(block, 1, sizeof block, file)) > 0;)
+        hash = silt_hash(hash, block, n);
+    if (file)
+        fclose(file);
+    return hash;
+}
+
+static uint64_t read_hash_outline(uint64_t hash, const silt_region *region) {
+    return region->outline ? silt_hash(hash, region->point, (size_t)region->n_point * 3 * sizeof(double)) : hash;
+}
+
+// hash of the resolved text without folders, and of what the files hold
 static uint64_t read_hash(const silt_scene *scene) {
+    const silt_fluid_def *fluid = &scene->fluid;
     char *text = silt_scene_text(scene, false);
     uint64_t hash = silt_hash(0, text, strlen(text));
     free(text);
-    for (int i = 0; i < scene->fluid.n_inlet; i++) {
-        const silt_series *series = &scene->fluid.inlet[i].series;
-        hash = silt_hash(hash, series->value, (size_t)series->n_row * series->n_column * sizeof *series->value);
+    for (int i = 0; i < fluid->n_inlet; i++) {
+        hash = read_hash_series(hash, &fluid->inlet[i].series);
+        hash = read_hash_series(hash, &fluid->inlet[i].head);
     }
-    return hash;
+    for (int i = 0; i < scene->n_wall; i++) {
+        hash = read_hash_series(hash, &scene->wall[i].motion);
+        hash = read_hash_file(hash, scene->wall[i].surface);
+    }
+    for (int i = 0; i < fluid->n_region; i++)
+        hash = read_hash_outline(hash, &fluid->region[i]);
+    for (int i = 0; i < scene->bed.n_region; i++)
+        hash = read_hash_outline(hash, &scene->bed.region[i]);
+    for (int i = 0; i < fluid->n_size; i++)
+        hash = read_hash_outline(hash, &fluid->size_at[i].region);
+    hash = read_hash_series(hash, &fluid->velocity.series);
+    hash = read_hash_series(hash, &fluid->force.series);
+    return read_hash_file(hash, fluid->cloud);
 }
 
 silt_status silt_scene_read(const char *path, int n_set, const char *const *set, silt_scene **scene, silt_error *err) {
@@ -664,6 +767,7 @@ silt_status silt_scene_read(const char *path, int n_set, const char *const *set,
     if (reader.root) {
         read_table(&state, &silt_scene_keys, made, reader.root, "");
         read_pendings(&state);
+        silt_scene_settle(&reader, made);
         silt_scene_check(&reader, made);
     }
     silt_status status = silt_complaints_report(&reader, err);

@@ -15,6 +15,8 @@ static bool write_present(const silt_key *key, const void *base) {
         return word != 0;
     case PRESENT_TEXT:
         return *(char *const *)at != NULL;
+    case ABSENT_TEXT:
+        return *(char *const *)at == NULL;
     case PRESENT_ALWAYS:
         break;
     }
@@ -36,10 +38,8 @@ static void write_number(FILE *to, double x) {
     fprintf(to, "%s", text);
 }
 
-// numbers of one point or pair in brackets; the third coordinate only when there is one
+// numbers of one point or pair in brackets
 static void write_numbers(FILE *to, int n, const double *x) {
-    if (n == 3 && x[2] == 0)
-        n = 2;
     for (int i = 0; i < n; i++) {
         fprintf(to, i ? ", " : "[");
         write_number(to, x[i]);
@@ -47,10 +47,10 @@ static void write_numbers(FILE *to, int n, const double *x) {
     fputc(']', to);
 }
 
-static void write_points(FILE *to, int n, const double *x) {
+static void write_points(FILE *to, int n, int dimension, const double *x) {
     for (int i = 0; i < n; i++) {
         fprintf(to, i ? ", " : "[");
-        write_numbers(to, 3, x + 3 * i);
+        write_numbers(to, dimension, x + 3 * i);
     }
     fputc(']', to);
 }
@@ -86,27 +86,33 @@ static const char *write_word(const silt_key *key, int value) {
 }
 
 // true when the row has something to say about this struct
-static bool write_counts(const silt_key_table *table, const silt_key *key, const void *base) {
+static bool write_counts(const silt_key_table *table, const silt_key *key, const void *base, int dimension) {
     const void *at = (const char *)base + key->offset, *count = (const char *)base + key->count;
     int kind = 0;
     if (table->selector >= 0)
         memcpy(&kind, (const char *)base + table->selector, sizeof kind);
-    if (key->flags & KEY_SHORTHAND || (key->when && !(key->when >> kind & 1)) || (key->select && key->select != kind))
+    if (key->flags & KEY_SHORTHAND || (key->when && !(key->when >> kind & 1)) || (key->select && key->select != kind) ||
+        !silt_key_fits(key, dimension))
         return false;
     switch (key->kind) {
     case KEY_NUMBER:
-    case KEY_PAIR:
         return !isnan(*(const double *)at);
+    case KEY_SEGMENT:
+        return memcmp(at, (const char *)at + 3 * sizeof(double), 3 * sizeof(double)) != 0;
+    case KEY_PAIR:
+        return ((const double *)at)[0] < ((const double *)at)[1];
     case KEY_TEXT:
     case KEY_NAME:
     case KEY_FILE:
+    case KEY_SURFACE:
         return *(char *const *)at != NULL;
     case KEY_SERIES:
+    case KEY_TABLE:
         return ((const silt_series *)at)->n_row > 0;
     case KEY_LIST:
     case KEY_CHAIN:
     case KEY_POLYGON:
-        return *(const int *)count > 0;
+        return *(const int *)count > 0 && write_present(key, base);
     case KEY_BLOCK:
         return write_present(key, base);
     default:
@@ -114,12 +120,26 @@ static bool write_counts(const silt_key_table *table, const silt_key *key, const
     }
 }
 
-static void write_file(FILE *to, const char *path, bool folders) {
+/** where the text goes and how files are named in it */
+typedef struct write_state {
+    FILE *to;
+    int dimension;
+    bool folders;            // files with their folder, or their last part only
+    const char *const *name; // or the k-th file as name[k]; NULL: not
+    int n_file, capacity;
+    const char **file; // owned by the caller in the end, the files met so far
+} write_state;
+
+static void write_file(write_state *state, const char *path) {
     const char *slash = strrchr(path, '/');
-    write_text(to, folders || !slash ? path : slash + 1);
+    SILT_RESERVE(state->file, state->capacity, state->n_file + 1);
+    state->file[state->n_file++] = path;
+    write_text(state->to, state->name ? state->name[state->n_file - 1] : state->folders || !slash ? path : slash + 1);
 }
 
-static void write_value(FILE *to, const silt_key *key, const void *base, bool folders) {
+static void write_value(write_state *state, const silt_key *key, const void *base) {
+    FILE *to = state->to;
+    const int dimension = state->dimension;
     const void *at = (const char *)base + key->offset;
     int number = 0;
     switch (key->kind) {
@@ -147,24 +167,35 @@ static void write_value(FILE *to, const silt_key *key, const void *base, bool fo
         write_text(to, *(char *const *)at);
         break;
     case KEY_FILE:
-        write_file(to, *(char *const *)at, folders);
+    case KEY_SURFACE:
+        write_file(state, *(char *const *)at);
         break;
     case KEY_SERIES:
-        write_file(to, ((const silt_series *)at)->path, folders);
+    case KEY_TABLE:
+        write_file(state, ((const silt_series *)at)->path);
         break;
     case KEY_POINT:
-        write_numbers(to, 3, at);
+        write_numbers(to, dimension, at);
+        break;
+    case KEY_PLACE:
+        if (dimension == 3)
+            write_numbers(to, 2, at);
+        else
+            write_number(to, *(const double *)at);
         break;
     case KEY_PAIR:
         write_numbers(to, 2, at);
         break;
+    case KEY_ACROSS:
+        write_numbers(to, 2, (const double[2]){((const double *)at)[1], ((const double *)at)[4]});
+        break;
     case KEY_SEGMENT:
     case KEY_BOX:
-        write_points(to, 2, at);
+        write_points(to, 2, dimension, at);
         break;
     case KEY_CHAIN:
     case KEY_POLYGON:
-        write_points(to, *(const int *)((const char *)base + key->count), *(double *const *)at);
+        write_points(to, *(const int *)((const char *)base + key->count), 2, *(double *const *)at);
         break;
     default:
         break;
@@ -172,16 +203,17 @@ static void write_value(FILE *to, const silt_key *key, const void *base, bool fo
 }
 
 // `dash`: the first row goes behind "- " of a list
-static void write_table(FILE *to, const silt_key_table *table, const void *base, int indent, bool dash, bool folders) {
+static void write_table(write_state *state, const silt_key_table *table, const void *base, int indent, bool dash) {
+    FILE *to = state->to;
     for (const silt_key *key = table->key; key->name; key++) {
-        if (!write_counts(table, key, base))
+        if (!write_counts(table, key, base, state->dimension))
             continue;
         fprintf(to, "%*s%s%s:", dash ? indent - 2 : indent, "", dash ? "- " : "", key->name);
         dash = false;
         if (key->kind == KEY_BLOCK) {
             fputc('\n', to);
             long before = ftell(to);
-            write_table(to, key->sub, (const char *)base + key->offset, indent + 2, false, folders);
+            write_table(state, key->sub, (const char *)base + key->offset, indent + 2, false);
             // a block may have nothing to say but that it is there
             if (ftell(to) == before)
                 fprintf(to, "%*s{}\n", indent + 2, "");
@@ -190,22 +222,57 @@ static void write_table(FILE *to, const silt_key_table *table, const void *base,
             int n = *(const int *)((const char *)base + key->count);
             const char *item = *(char *const *)((const char *)base + key->offset);
             for (int i = 0; i < n; i++)
-                write_table(to, key->sub, item + (size_t)i * key->sub->size, indent + 4, true, folders);
+                write_table(state, key->sub, item + (size_t)i * key->sub->size, indent + 4, true);
         } else {
             fputc(' ', to);
-            write_value(to, key, base, folders);
+            write_value(state, key, base);
             fputc('\n', to);
         }
     }
 }
 
-char *silt_scene_text(const silt_scene *scene, bool folders) {
+// the whole text; state->file keeps what files are in it
+static char *write_scene(const silt_scene *scene, write_state *state) {
     char *text = NULL;
     size_t size = 0;
-    FILE *to = open_memstream(&text, &size);
-    if (!to)
+    state->to = open_memstream(&text, &size);
+    state->dimension = scene->dimension == 3 ? 3 : 2;
+    if (!state->to)
         return silt_text("%s", "");
-    write_table(to, &silt_scene_keys, scene, 0, false, folders);
-    fclose(to);
+    write_table(state, &silt_scene_keys, scene, 0, false);
+    fclose(state->to);
+    return text;
+}
+
+char *silt_scene_text(const silt_scene *scene, bool folders) {
+    write_state state = {.folders = folders};
+    char *text = write_scene(scene, &state);
+    free(state.file);
+    return text;
+}
+
+int silt_scene_files(const silt_scene *scene, const char ***file) {
+    write_state state = {.folders = true};
+    free(write_scene(scene, &state));
+    *file = state.file;
+    return state.n_file;
+}
+
+char *silt_scene_text_named(const silt_scene *scene, const char *const *name) {
+    write_state state = {.name = name};
+    char *text = write_scene(scene, &state);
+    free(state.file);
+    return text;
+}
+
+char *silt_scene_named(const silt_scene *scene, silt_file_name *name, void *self) {
+    const char **file = NULL;
+    const int n = silt_scene_files(scene, &file);
+    const char **named = silt_alloc((size_t)n + 1, sizeof *named);
+    for (int k = 0; k < n; k++)
+        named[k] = name(self, file[k]);
+    char *text = silt_scene_text_named(scene, named);
+    free(named);
+    free(file);
     return text;
 }

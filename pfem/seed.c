@@ -1,89 +1,99 @@
 // the first cloud: water in its regions, nodes on inlets and on the tank's corners
-#include "pfem.h"
+#include "seed.h"
 
-typedef struct seed {
-    silt_nodes *nodes;
-    const silt_scene *scene;
-    const silt_walls *walls;
-    silt_solid_test solid;
-    const void *context;
-    double h;
-    int *grid, nx, ny; // cells of h, each with the last node put there, for spacing tests
-    int *link;         // next node in the same grid cell
-    int link_capacity;
-    double lo[2];
-} seed;
-
-static int *seed_bin(const seed *s, int i, int j) {
-    return i < 0 || j < 0 || i >= s->nx || j >= s->ny ? NULL : &s->grid[j * s->nx + i];
+double seed_h(const seed *s, const double *x) {
+    return silt_size_at(s->size, s->scene, x);
 }
 
-// true when a node lies closer than `gap`
-static bool seed_crowded(const seed *s, const double *x, double gap) {
-    const int ci = (int)floor((x[0] - s->lo[0]) / s->h), cj = (int)floor((x[1] - s->lo[1]) / s->h);
-    for (int j = cj - 1; j <= cj + 1; j++)
-        for (int i = ci - 1; i <= ci + 1; i++) {
-            const int *bin = seed_bin(s, i, j);
-            for (int k = bin ? *bin : -1; k >= 0; k = s->link[k])
-                if (hypot(s->nodes->x[2 * k] - x[0], s->nodes->x[2 * k + 1] - x[1]) < gap)
-                    return true;
+double seed_apart(const seed *s, const double *a, const double *b) {
+    double d[3] = {0};
+    for (int c = 0; c < s->dim; c++)
+        d[c] = a[c] - b[c];
+    if (s->period > 0)
+        d[0] -= s->period * floor(d[0] / s->period + 0.5);
+    return s->dim == 3 ? sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) : hypot(d[0], d[1]);
+}
+
+static int seed_bin(const seed *s, int d, double x) {
+    return d < s->dim ? (int)silt_clamp(floor((x - s->lo[d]) / s->width), -1, s->bin[d]) : 0;
+}
+
+int seed_near(const seed *s, const double *x, double reach, int room, int *list) {
+    int n = 0, lo[3], hi[3];
+    for (int image = s->period > 0 ? -1 : 0; image <= (s->period > 0 ? 1 : 0); image++) {
+        for (int d = 0; d < 3; d++) {
+            const double at = d < s->dim ? x[d] + (d == 0 ? image * s->period : 0) : 0;
+            lo[d] = (int)silt_max(seed_bin(s, d, at - reach), 0);
+            hi[d] = (int)silt_min(seed_bin(s, d, at + reach), s->bin[d] - 1);
         }
-    return false;
+        for (int k = lo[2]; k <= hi[2]; k++)
+            for (int j = lo[1]; j <= hi[1]; j++)
+                for (int i = lo[0]; i <= hi[0]; i++)
+                    for (int m = s->grid[(k * s->bin[1] + j) * s->bin[0] + i]; m >= 0 && n < room; m = s->link[m])
+                        if (seed_apart(s, s->nodes->x + s->dim * m, x) < reach)
+                            list[n++] = m;
+    }
+    return n;
 }
 
-static void seed_enter(seed *s, int k) {
+bool seed_crowded(const seed *s, const double *x, double gap) {
+    int one;
+    return seed_near(s, x, gap, 1, &one) > 0;
+}
+
+void seed_enter(seed *s, int k) {
     SILT_RESERVE(s->link, s->link_capacity, k + 1);
-    const double *x = s->nodes->x + 2 * k;
-    int *bin = seed_bin(s, (int)floor((x[0] - s->lo[0]) / s->h), (int)floor((x[1] - s->lo[1]) / s->h));
+    int at[3];
+    bool in = true;
+    for (int d = 0; d < 3; d++) {
+        at[d] = d < s->dim ? seed_bin(s, d, s->nodes->x[s->dim * k + d]) : 0;
+        in &= at[d] >= 0 && at[d] < s->bin[d];
+    }
+    int *bin = in ? &s->grid[(at[2] * s->bin[1] + at[1]) * s->bin[0] + at[0]] : NULL;
     s->link[k] = bin ? *bin : -1;
     if (bin)
         *bin = k;
 }
 
-static int seed_add(seed *s, silt_node_kind kind, int owner, const double *x) {
+void seed_sort(seed *s) {
+    for (int k = 0; k < s->bin[0] * s->bin[1] * s->bin[2]; k++)
+        s->grid[k] = -1;
+    for (int k = 0; k < s->nodes->count; k++)
+        seed_enter(s, k);
+}
+
+int seed_add(seed *s, silt_node_kind kind, int owner, const double *x) {
     const int k = silt_nodes_add(s->nodes, kind, owner, x);
     seed_enter(s, k);
     return k;
 }
 
-// a node on the tank's wall knows its segments; closer than a thousandth of h counts as on
-static bool seed_on_walls(const seed *s, const double *x, int wall[2], double on[2]) {
-    wall[0] = wall[1] = -1;
-    on[0] = x[0];
-    on[1] = x[1];
-    for (int k = 0; k < s->walls->count; k++) {
-        const double *a = s->walls->from[k], *b = s->walls->to[k], *n = s->walls->normal[k];
-        const double dx = b[0] - a[0], dy = b[1] - a[1], length = hypot(dx, dy);
-        const double along = ((x[0] - a[0]) * dx + (x[1] - a[1]) * dy) / length;
-        const double off = (x[0] - a[0]) * n[0] + (x[1] - a[1]) * n[1];
-        if (fabs(off) > 1e-3 * s->h || along < -1e-3 * s->h || along > length + 1e-3 * s->h)
-            continue;
-        if (wall[0] < 0)
-            wall[0] = k;
-        else if (wall[1] < 0 && fabs(s->walls->normal[wall[0]][0] * n[1] - s->walls->normal[wall[0]][1] * n[0]) > 0.3)
-            wall[1] = k; // nearly straight joints hold nothing
-        if (along < 1e-3 * s->h || along > length - 1e-3 * s->h)
-            memcpy(on, along < 1e-3 * s->h ? a : b, 2 * sizeof *on);
-        else
-            for (int d = 0; d < 2; d++)
-                on[d] = a[d] + along * (b[d] - a[d]) / length;
-    }
-    return wall[0] >= 0;
+// a periodic place between both ends
+static void seed_wrap(const seed *s, double *x) {
+    if (s->period <= 0)
+        return;
+    x[0] -= s->period * floor((x[0] - s->scene->period[0]) / s->period);
+    if (x[0] > s->scene->period[1] - 1e-9 * s->h)
+        x[0] = s->scene->period[0];
 }
 
-static void seed_water(seed *s, const double *x, double gap, double margin) {
-    double on[2];
-    int wall[2], nearest;
-    const bool on_wall = seed_on_walls(s, x, wall, on);
-    if (!on_wall && silt_walls_distance(s->walls, x, &nearest) < 0.25 * s->h && s->walls->count)
+// a node on the tank's wall knows its elements; closer than a thousandth of h counts as on
+void seed_water(seed *s, const double *x, double gap, double margin) {
+    double on[3] = {0}, at[3] = {0};
+    int wall[3] = {-1, -1, -1}, nearest;
+    memcpy(at, x, (size_t)s->dim * sizeof *at);
+    seed_wrap(s, at);
+    memcpy(on, at, sizeof on);
+    const double h = s->size ? seed_h(s, at) : s->h;
+    const bool on_wall = s->walls->count && silt_walls_touching(s->walls, at, 1e-3 * s->h, wall, on) > 0;
+    if (!on_wall && silt_walls_distance(s->walls, at, &nearest) < 0.25 * h && s->walls->count)
         return;
     if (s->solid && s->solid(s->context, on, margin))
         return;
     if (seed_crowded(s, on, gap))
         return;
     const int k = seed_add(s, NODE_FLUID, -1, on);
-    s->nodes->wall[k][0] = wall[0];
-    s->nodes->wall[k][1] = wall[1];
+    memcpy(s->nodes->wall[k], wall, sizeof wall);
 }
 
 // the outline of a region as points
@@ -115,14 +125,29 @@ static int seed_outline(const silt_region *region, double h, double **xy) {
     return count;
 }
 
+// a place a little off in direction k of 8 (14 in space)
+static void seed_probe(const seed *s, const double *x, int k, double angle, double probe[3]) {
+    static const double corner[14][3] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},   {0, -1, 0}, {0, 0, 1},   {0, 0, -1},  {1, 1, 1},
+                                         {-1, 1, 1}, {1, -1, 1}, {-1, -1, 1}, {1, 1, -1}, {-1, 1, -1}, {1, -1, -1}, {-1, -1, -1}};
+    if (s->dim == 3) { // tilted by `angle`, so that none lies in a face
+        for (int d = 0; d < 3; d++)
+            probe[d] = x[d] + 1e-3 * s->h * (corner[k][d] + angle * (0.31 * corner[k][(d + 1) % 3] - 0.17 * corner[k][(d + 2) % 3]));
+    } else {
+        probe[0] = x[0] + 1e-3 * s->h * cos((k + angle) * M_PI / 4);
+        probe[1] = x[1] + 1e-3 * s->h * sin((k + angle) * M_PI / 4);
+        probe[2] = 0;
+    }
+    seed_wrap(s, probe);
+}
+
 // true when the point lies inside another region, not on its rim
 static bool seed_inside_other(const seed *s, int region, const double *x) {
-    const silt_fluid_def *fluid = &s->scene->fluid;
-    for (int r = 0; r < fluid->n_region; r++) {
+    for (int r = 0; r < s->scene->fluid.n_region; r++) {
         bool all = r != region;
-        for (int k = 0; k < 8 && all; k++) {
-            const double probe[3] = {x[0] + 1e-3 * s->h * cos(k * M_PI / 4), x[1] + 1e-3 * s->h * sin(k * M_PI / 4), 0};
-            all = silt_region_contains(&fluid->region[r], probe);
+        for (int k = 0; k < (s->dim == 3 ? 14 : 8) && all; k++) {
+            double probe[3];
+            seed_probe(s, x, k, 0, probe);
+            all = silt_region_contains(&s->scene->fluid.region[r], probe);
         }
         if (all)
             return true;
@@ -132,20 +157,24 @@ static bool seed_inside_other(const seed *s, int region, const double *x) {
 
 // two regions that share a piece of outline: the piece lies inside their union
 static bool seed_inside_union(const seed *s, const double *x) {
-    const silt_fluid_def *fluid = &s->scene->fluid;
-    for (int k = 0; k < 8; k++) {
-        const double angle = (k + 0.37) * M_PI / 4;
-        const double probe[3] = {x[0] + 1e-3 * s->h * cos(angle), x[1] + 1e-3 * s->h * sin(angle), 0};
+    for (int k = 0; k < (s->dim == 3 ? 14 : 8); k++) {
+        double probe[3];
+        seed_probe(s, x, k, 0.37, probe);
         bool in = false;
-        for (int r = 0; r < fluid->n_region && !in; r++)
-            in = silt_region_contains(&fluid->region[r], probe);
+        for (int r = 0; r < s->scene->fluid.n_region && !in; r++)
+            in = silt_region_contains(&s->scene->fluid.region[r], probe);
         if (!in)
             return false;
     }
     return true;
 }
 
-static void seed_region(seed *s, int r, const double lo[2], const double hi[2], uint64_t *random) {
+bool seed_open(const seed *s, int region, const double *x) {
+    return !seed_inside_other(s, region, x) && !seed_inside_union(s, x);
+}
+
+// the plane's lattice
+static void seed_region(seed *s, int r, const double lo[2], const double hi[2]) {
     const silt_fluid_def *fluid = &s->scene->fluid;
     const double h = s->h, row = h * sqrt(3) / 2;
     // rows that fill the region's height evenly, so that the lattice meets the outline well
@@ -158,9 +187,10 @@ static void seed_region(seed *s, int r, const double lo[2], const double hi[2], 
             double x[3] = {lo[0] + (i + (j % 2 ? 0.5 : 0)) * dx, lo[1] + j * dy, 0};
             if (fluid->jitter > 0)
                 for (int d = 0; d < 2; d++)
-                    x[d] += fluid->jitter * h * (2 * silt_uniform(random) - 1);
+                    x[d] += fluid->jitter * h * (2 * silt_uniform(&s->random) - 1);
             if (!silt_region_contains(&fluid->region[r], x))
                 continue;
+            seed_wrap(s, x);
             int nearest;
             if (silt_walls_distance(s->walls, x, &nearest) < 0.4 * h)
                 continue;
@@ -175,10 +205,16 @@ static void seed_region(seed *s, int r, const double lo[2], const double hi[2], 
 
 // where inlets stand: nodes at spacing h on the segment
 static void seed_inlets(seed *s) {
-    for (int k = 0; k < s->scene->fluid.n_inlet; k++) {
+    for (int k = 0; k < s->scene->fluid.n_inlet && s->dim == 2; k++) {
         const silt_inlet *inlet = &s->scene->fluid.inlet[k];
         const double length = hypot(inlet->to[0] - inlet->from[0], inlet->to[1] - inlet->from[1]);
-        const int pieces = (int)silt_max(1, floor(length / s->h + 0.5));
+        double h = s->h;
+        for (int m = 0; m <= 8 && s->size; m++) {
+            const double x[2] = {inlet->from[0] + (inlet->to[0] - inlet->from[0]) * m / 8,
+                                 inlet->from[1] + (inlet->to[1] - inlet->from[1]) * m / 8};
+            h = m ? silt_min(h, seed_h(s, x)) : seed_h(s, x);
+        }
+        const int pieces = (int)silt_max(1, floor(length / h + 0.5));
         for (int m = 0; m <= pieces; m++) {
             const double x[2] = {inlet->from[0] + (inlet->to[0] - inlet->from[0]) * m / pieces,
                                  inlet->from[1] + (inlet->to[1] - inlet->from[1]) * m / pieces};
@@ -191,79 +227,239 @@ static void seed_inlets(seed *s) {
 
 // corners of the tank that point into the water
 static void seed_corners(seed *s) {
-    const silt_walls *walls = s->walls;
-    for (int a = 0; a < walls->count; a++) {
-        const int b = walls->next[a];
-        if (b < 0)
-            continue;
-        const double sine = walls->normal[a][0] * walls->normal[b][1] - walls->normal[a][1] * walls->normal[b][0];
-        if (sine < -1e-3 && !seed_crowded(s, walls->to[a], 1e-6 * s->h))
-            seed_add(s, NODE_CORNER, a, walls->to[a]);
+    double *point, finest = s->h;
+    int(*element)[3];
+    for (int r = 0; r < s->scene->fluid.n_size; r++)
+        finest = silt_min(finest, s->scene->fluid.size_at[r].size);
+    const int n = silt_walls_ridges(s->walls, finest, &point, &element);
+    // corners in any case, along edges what the size field leaves
+    for (int pass = 0; pass < 2; pass++)
+        for (int k = 0; k < n; k++) {
+            const double *x = point + 3 * k;
+            const bool corner = element[k][2] >= 0 || s->dim == 2 || !s->size;
+            if (corner == (pass == 0) && !seed_crowded(s, x, corner ? 1e-6 * s->h : 0.75 * seed_h(s, x)))
+                seed_add(s, NODE_CORNER, element[k][0], x);
+        }
+    free(point);
+    free(element);
+}
+
+// bins over everything that may be seeded; finest: the smallest distance
+static bool seed_start(seed *s, silt_nodes *nodes, const silt_scene *scene, const silt_walls *walls, silt_solid_test solid,
+                       const void *context) {
+    const silt_fluid_def *fluid = &scene->fluid;
+    *s = (seed){.nodes = nodes, .scene = scene, .walls = walls, .solid = solid, .context = context, .h = fluid->size};
+    s->dim = scene->dimension == 3 ? 3 : 2;
+    s->period = silt_max(scene->period[1] - scene->period[0], 0);
+    s->random = (uint64_t)fluid->seed;
+    nodes->dim = s->dim;
+    for (int d = 0; d < 3; d++) {
+        s->lo[d] = HUGE_VAL;
+        s->hi[d] = -HUGE_VAL;
     }
+    for (int r = 0; r < fluid->n_region; r++) {
+        double lo[3], hi[3];
+        silt_region_bounds(&fluid->region[r], lo, hi);
+        for (int d = 0; d < s->dim; d++) {
+            s->lo[d] = silt_min(s->lo[d], lo[d]);
+            s->hi[d] = silt_max(s->hi[d], hi[d]);
+        }
+    }
+    for (int k = 0; k < walls->count; k++)
+        for (int c = 0; c < s->dim; c++)
+            for (int d = 0; d < s->dim; d++) {
+                const double x = s->dim == 3 ? walls->corner[k][c][d] : c ? walls->to[k][d] : walls->from[k][d];
+                s->lo[d] = silt_min(s->lo[d], x);
+                s->hi[d] = silt_max(s->hi[d], x);
+            }
+    if (s->lo[0] > s->hi[0])
+        return false;
+    // between the finest and the coarsest distance, and not more bins than memory has room for
+    double finest = s->h;
+    for (int r = 0; r < fluid->n_size; r++)
+        finest = silt_min(finest, fluid->size_at[r].size);
+    s->width = sqrt(finest * s->h);
+    for (double bins = HUGE_VAL; bins > 2e7; s->width *= bins > 2e7 ? 1.3 : 1) {
+        bins = 1;
+        for (int d = 0; d < 3; d++)
+            bins *= s->bin[d] = d < s->dim ? (int)((s->hi[d] - s->lo[d]) / s->width) + 4 : 1;
+    }
+    for (int d = 0; d < s->dim; d++)
+        s->lo[d] -= s->width;
+    s->grid = silt_alloc((size_t)(s->bin[0] * s->bin[1] * s->bin[2]), sizeof *s->grid);
+    seed_sort(s);
+
+    silt_size_create(&s->size, scene, walls);
+    if (!s->size)
+        return true;
+    // bodies and bed stand already; the surface is the outline that no wall holds
+    for (int i = 0; i < nodes->count; i++)
+        if (nodes->kind[i] == NODE_BED || nodes->kind[i] == NODE_BODY)
+            silt_size_near(s->size, nodes->kind[i] == NODE_BED ? NEAR_BED : NEAR_BODIES, 1, nodes->x + s->dim * i);
+    for (int r = 0; r < fluid->n_region; r++) {
+        double *x;
+        const int n = seed_outline_samples(s, r, finest, &x);
+        int free_points = 0;
+        for (int k = 0; k < n; k++) {
+            int element;
+            if (fabs(silt_walls_distance(walls, x + s->dim * k, &element)) > 1e-3 * s->h && seed_open(s, r, x + s->dim * k))
+                memmove(x + s->dim * free_points++, x + s->dim * k, (size_t)s->dim * sizeof *x);
+        }
+        silt_size_near(s->size, NEAR_SURFACE, free_points, x);
+        free(x);
+    }
+    return true;
+}
+
+static void seed_end(seed *s) {
+    silt_size_free(&s->size);
+    free(s->grid);
+    free(s->link);
+}
+
+static void seed_velocity(seed *s, int first) {
+    const silt_scene *scene = s->scene;
+    silt_nodes *nodes = s->nodes;
+    const double g = silt_length(3, scene->gravity);
+    for (int i = first; i < nodes->count; i++) {
+        if (nodes->kind[i] != NODE_FLUID || scene->fluid.velocity.kind == FORMULA_NONE)
+            continue;
+        double v[3] = {0}, x[3] = {0};
+        memcpy(x, nodes->x + s->dim * i, (size_t)s->dim * sizeof *x);
+        silt_formula_velocity(&scene->fluid.velocity, g, x, v);
+        memcpy(nodes->v + s->dim * i, v, (size_t)s->dim * sizeof *v);
+    }
+}
+
+static void seed_sizes(seed *s) {
+    silt_nodes *nodes = s->nodes;
+    if (!s->size)
+        return;
+    if (!nodes->h)
+        nodes->h = silt_alloc((size_t)silt_max(nodes->capacity, 1), sizeof *nodes->h);
+    for (int i = 0; i < nodes->count; i++)
+        nodes->h[i] = seed_h(s, nodes->x + s->dim * i);
 }
 
 void silt_nodes_seed(silt_nodes *nodes, const silt_scene *scene, const silt_walls *walls, silt_solid_test solid,
                      const void *context) {
     const silt_fluid_def *fluid = &scene->fluid;
-    seed s = {.nodes = nodes, .scene = scene, .walls = walls, .solid = solid, .context = context, .h = fluid->size};
-    // the box of everything that may be seeded
-    double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL};
-    double *outline[fluid->n_region ? fluid->n_region : 1];
-    int n_outline[fluid->n_region ? fluid->n_region : 1];
-    for (int r = 0; r < fluid->n_region; r++) {
-        n_outline[r] = seed_outline(&fluid->region[r], fluid->size, &outline[r]);
-        for (int k = 0; k < n_outline[r]; k++)
-            for (int d = 0; d < 2; d++) {
-                lo[d] = silt_min(lo[d], outline[r][2 * k + d]);
-                hi[d] = silt_max(hi[d], outline[r][2 * k + d]);
-            }
-    }
-    for (int k = 0; k < walls->count; k++)
-        for (int d = 0; d < 2; d++) {
-            lo[d] = silt_min(lo[d], walls->from[k][d]);
-            hi[d] = silt_max(hi[d], walls->from[k][d]);
-        }
-    if (lo[0] > hi[0])
+    seed s;
+    if (!seed_start(&s, nodes, scene, walls, solid, context))
         return;
-    for (int d = 0; d < 2; d++)
-        s.lo[d] = lo[d] - s.h;
-    s.nx = (int)((hi[0] - lo[0]) / s.h) + 4;
-    s.ny = (int)((hi[1] - lo[1]) / s.h) + 4;
-    s.grid = silt_alloc((size_t)s.nx * (size_t)s.ny, sizeof *s.grid);
-    for (int k = 0; k < s.nx * s.ny; k++)
-        s.grid[k] = -1;
-    for (int k = 0; k < nodes->count; k++)
-        seed_enter(&s, k);
-
     // fixed things first, then outlines, then the inside
     seed_inlets(&s);
     seed_corners(&s);
-    uint64_t random = (uint64_t)fluid->seed;
-    for (int r = 0; r < fluid->n_region; r++)
-        for (int k = 0; k < n_outline[r]; k++)
-            if (!seed_inside_other(&s, r, outline[r] + 2 * k) && !seed_inside_union(&s, outline[r] + 2 * k))
-                seed_water(&s, outline[r] + 2 * k, 0.35 * s.h, 0.35 * s.h);
-    for (int r = 0; r < fluid->n_region; r++) {
-        double a[2] = {HUGE_VAL, HUGE_VAL}, b[2] = {-HUGE_VAL, -HUGE_VAL};
-        for (int k = 0; k < n_outline[r]; k++)
-            for (int d = 0; d < 2; d++) {
-                a[d] = silt_min(a[d], outline[r][2 * k + d]);
-                b[d] = silt_max(b[d], outline[r][2 * k + d]);
-            }
-        seed_region(&s, r, a, b, &random);
-        free(outline[r]);
+    if (s.dim == 3 || s.size) {
+        for (int r = 0; r < fluid->n_region; r++)
+            seed_fill_outline(&s, r);
+        for (int r = 0; r < fluid->n_region; r++)
+            seed_fill_region(&s, r);
+    } else {
+        double *outline[fluid->n_region ? fluid->n_region : 1];
+        int n_outline[fluid->n_region ? fluid->n_region : 1];
+        for (int r = 0; r < fluid->n_region; r++) {
+            n_outline[r] = seed_outline(&fluid->region[r], fluid->size, &outline[r]);
+            for (int k = 0; k < n_outline[r]; k++)
+                if (seed_open(&s, r, outline[r] + 2 * k))
+                    seed_water(&s, outline[r] + 2 * k, 0.35 * s.h, 0.35 * s.h);
+        }
+        for (int r = 0; r < fluid->n_region; r++) {
+            double a[2] = {HUGE_VAL, HUGE_VAL}, b[2] = {-HUGE_VAL, -HUGE_VAL};
+            for (int k = 0; k < n_outline[r]; k++)
+                for (int d = 0; d < 2; d++) {
+                    a[d] = silt_min(a[d], outline[r][2 * k + d]);
+                    b[d] = silt_max(b[d], outline[r][2 * k + d]);
+                }
+            seed_region(&s, r, a, b);
+            free(outline[r]);
+        }
     }
-    free(s.grid);
-    free(s.link);
+    seed_velocity(&s, 0);
+    seed_sizes(&s);
+    seed_end(&s);
+}
 
-    // initial velocity
-    const double g = sqrt(silt_square(scene->gravity[0]) + silt_square(scene->gravity[1]));
-    for (int i = 0; i < nodes->count; i++) {
-        if (nodes->kind[i] != NODE_FLUID || fluid->velocity.kind == FORMULA_NONE)
-            continue;
-        double v[3] = {0}, x[3] = {nodes->x[2 * i], nodes->x[2 * i + 1], 0};
-        silt_formula_velocity(&fluid->velocity, g, x, v);
-        nodes->v[2 * i] = v[0];
-        nodes->v[2 * i + 1] = v[1];
+// ---- a cloud from a file
+
+static silt_status cloud_take(seed *s, const silt_series *table, silt_error *err) {
+    static const char *const name[6] = {"x", "y", "z", "vx", "vy", "vz"};
+    int column[6];
+    bool moving = true;
+    for (int c = 0; c < 6; c++) {
+        column[c] = silt_series_column(table, name[c]);
+        if (c < s->dim && column[c] < 0)
+            return silt_fail(err, SILT_INPUT, "%s: no column %s; a cloud has the columns x, y%s and may have vx, vy%s",
+                             table->path, name[c], s->dim == 3 ? ", z" : "", s->dim == 3 ? ", vz" : "");
+        moving &= column[c] >= 0 || c < 3 || c >= 3 + s->dim;
     }
+    const int first = s->nodes->count;
+    int *row_of = silt_alloc((size_t)table->n_row + 1, sizeof *row_of);
+    silt_status status = SILT_OK;
+    for (int row = 0; row < table->n_row && status == SILT_OK; row++) {
+        const double *value = table->value + (size_t)row * (size_t)table->n_column;
+        double x[3] = {0}, on[3];
+        int wall[3] = {-1, -1, -1}, element, other;
+        for (int c = 0; c < 3 + s->dim; c++) {
+            const bool wanted = c < s->dim || (c >= 3 && moving);
+            if (wanted && !isfinite(value[column[c]]))
+                status = silt_fail(err, SILT_INPUT, "%s:%d: no number for %s", table->path, table->line[row], name[c]);
+            else if (c < s->dim)
+                x[c] = value[column[c]];
+        }
+        if (status != SILT_OK)
+            break;
+        for (int d = 0; d < s->dim; d++)
+            if (x[d] < s->lo[d] || x[d] > s->hi[d] + s->width)
+                status = silt_fail(err, SILT_INPUT, "%s:%d: %s = %g lies outside of regions and walls", table->path,
+                                   table->line[row], name[d], x[d]);
+        if (status != SILT_OK)
+            break;
+        seed_wrap(s, x);
+        memcpy(on, x, sizeof on);
+        if (s->walls->count && !silt_walls_touching(s->walls, x, 1e-3 * s->h, wall, on) &&
+            silt_walls_distance(s->walls, x, &element) < 0) {
+            status = silt_fail(err, SILT_INPUT, "%s:%d: the node lies behind a wall", table->path, table->line[row]);
+            break;
+        }
+        if (s->solid && s->solid(s->context, on, -1e-6 * s->h)) {
+            status = silt_fail(err, SILT_INPUT, "%s:%d: the node lies in the bed or in a body", table->path, table->line[row]);
+            break;
+        }
+        if (seed_near(s, on, 1e-6 * s->h, 1, &other)) {
+            if (s->nodes->kind[other] == NODE_FLUID)
+                status = silt_fail(err, SILT_INPUT, "%s:%d: the same place as line %d", table->path, table->line[row],
+                                   table->line[row_of[other - first]]);
+            continue; // inlets, corners, bed and bodies have their own nodes
+        }
+        const int k = seed_add(s, NODE_FLUID, -1, on);
+        memcpy(s->nodes->wall[k], wall, sizeof wall);
+        row_of[k - first] = row;
+    }
+    if (status == SILT_OK) {
+        seed_velocity(s, first);
+        for (int i = first; i < s->nodes->count && moving; i++)
+            for (int d = 0; d < s->dim; d++)
+                s->nodes->v[s->dim * i + d] = table->value[(size_t)row_of[i - first] * (size_t)table->n_column + (size_t)column[3 + d]];
+        seed_sizes(s);
+    }
+    free(row_of);
+    return status;
+}
+
+silt_status silt_nodes_read(silt_nodes *nodes, const silt_scene *scene, const silt_walls *walls, silt_solid_test solid,
+                            const void *context, silt_error *err) {
+    silt_series table = {0};
+    SILT_TRY(silt_series_read(scene->folder, scene->fluid.cloud, &table, err));
+    seed s;
+    silt_status status = SILT_OK;
+    if (seed_start(&s, nodes, scene, walls, solid, context)) {
+        seed_inlets(&s);
+        seed_corners(&s);
+        status = cloud_take(&s, &table, err);
+    } else
+        status = silt_fail(err, SILT_INPUT, "%s: a cloud needs a region or a wall in the scene to lie in", table.path);
+    seed_end(&s);
+    silt_series_clear(&table);
+    return status;
 }

@@ -32,52 +32,56 @@ void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def) {
 }
 
 // everything that walls, regions and bodies span, and room for splashes
+static void box_span(double lo[3], double hi[3], const double *x, int dim, double reach) {
+    for (int d = 0; d < dim; d++) {
+        lo[d] = silt_min(lo[d], x[d] - reach);
+        hi[d] = silt_max(hi[d], x[d] + reach);
+    }
+}
+
 void silt_run_box(silt_run *run) {
     const silt_scene *scene = run->scene;
-    double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL};
-#define SPAN(px, py)                                                                                                   \
-    do {                                                                                                               \
-        const double span_[2] = {(px), (py)};                                                                          \
-        for (int d_ = 0; d_ < 2; d_++) {                                                                               \
-            lo[d_] = silt_min(lo[d_], span_[d_]);                                                                      \
-            hi[d_] = silt_max(hi[d_], span_[d_]);                                                                      \
-        }                                                                                                              \
-    } while (0)
-    for (int s = 0; s < run->walls.count; s++) {
-        SPAN(run->walls.from[s][0], run->walls.from[s][1]);
-        SPAN(run->walls.to[s][0], run->walls.to[s][1]);
-    }
+    const int D = scene->dimension == 3 ? 3 : 2;
+    double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    for (int s = 0; s < run->walls.count; s++)
+        if (D == 3)
+            for (int c = 0; c < 3; c++)
+                box_span(lo, hi, run->walls.corner[s][c], D, 0);
+        else {
+            box_span(lo, hi, run->walls.from[s], D, 0);
+            box_span(lo, hi, run->walls.to[s], D, 0);
+        }
     const silt_region *lists[2] = {scene->fluid.region, scene->bed.region};
     const int counts[2] = {scene->fluid.n_region, scene->bed.n_region};
     for (int l = 0; l < 2; l++)
         for (int r = 0; r < counts[l]; r++) {
-            const silt_region *region = &lists[l][r];
-            if (region->kind == REGION_BOX) {
-                SPAN(region->lo[0], region->lo[1]);
-                SPAN(region->hi[0], region->hi[1]);
-            } else if (region->kind == REGION_CIRCLE) {
-                SPAN(region->centre[0] - region->radius, region->centre[1] - region->radius);
-                SPAN(region->centre[0] + region->radius, region->centre[1] + region->radius);
-            }
-            for (int k = 0; k < region->n_point; k++)
-                SPAN(region->point[3 * k], region->point[3 * k + 1]);
+            double a[3], b[3];
+            silt_region_bounds(&lists[l][r], a, b);
+            box_span(lo, hi, a, D, 0);
+            box_span(lo, hi, b, D, 0);
         }
-    for (int b = 0; b < scene->n_body; b++) {
-        const double reach = silt_max(scene->body[b].scale, scene->body[b].height);
-        SPAN(scene->body[b].at[0] - reach, scene->body[b].at[1] - reach);
-        SPAN(scene->body[b].at[0] + reach, scene->body[b].at[1] + reach);
-    }
-    for (int k = 0; k < scene->grains.n_grain; k++) {
-        const silt_grain_def *grain = &scene->grains.grain[k];
-        SPAN(grain->at[0] - grain->diameter, grain->at[1] - grain->diameter);
-        SPAN(grain->at[0] + grain->diameter, grain->at[1] + grain->diameter);
-    }
-#undef SPAN
-    for (int d = 0; d < 2; d++) {
-        const double margin = 0.5 * silt_max(hi[0] - lo[0], hi[1] - lo[1]);
+    for (int i = 0; i < run->nodes.count; i++)
+        box_span(lo, hi, run->nodes.x + D * i, D, 0);
+    for (int b = 0; b < scene->n_body; b++)
+        box_span(lo, hi, scene->body[b].at, D, silt_max(scene->body[b].scale, scene->body[b].height));
+    for (int k = 0; k < scene->grains.n_grain; k++)
+        box_span(lo, hi, scene->grains.grain[k].at, D, scene->grains.grain[k].diameter);
+    double margin = 0;
+    for (int d = 0; d < D; d++)
+        margin = silt_max(margin, 0.5 * (hi[d] - lo[d]));
+    for (int d = 0; d < D; d++) {
         run->box_lo[d] = lo[d] - margin;
         run->box_hi[d] = hi[d] + margin;
     }
+}
+
+// closed air of a fresh mesh
+silt_status silt_run_pockets(silt_run *run, silt_error *err) {
+    if (!(run->scene->fluid.air_pressure > 0))
+        return SILT_OK;
+    SILT_TRY(silt_air_find(&run->air, run->scene, &run->nodes, &run->mesh, &run->barrier, err));
+    silt_pockets_update(&run->pockets, run->scene, &run->nodes, &run->mesh, &run->air);
+    return SILT_OK;
 }
 
 silt_status silt_run_first(silt_run *run, silt_error *err) {
@@ -98,6 +102,7 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
         return SILT_OK;
 
     // bodies and bed first: the water keeps its distance
+    run->nodes.dim = scene->dimension;
     for (int b = 0; run->barrier.bodies && b < run->barrier.bodies->count; b++) {
         const struct silt_body *body = &run->barrier.bodies->body[b];
         const double c = 1 - 2 * silt_square(body->q[3]), s = 2 * body->q[0] * body->q[3];
@@ -114,8 +119,14 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
     for (int k = 0; k < run->bed.n_node; k++)
         if (run->bed.exposed[k])
             run->bed.fluid_node[k] = silt_nodes_add(&run->nodes, NODE_BED, k, run->bed.x[k]);
-    silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
+    silt_size_create(&run->size, scene, &run->walls);
+    if (scene->fluid.cloud)
+        SILT_TRY(silt_nodes_read(&run->nodes, scene, &run->walls, run_solid, &run->barrier, err));
+    else
+        silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
     SILT_TRY(silt_mesh_first(&run->mesh, &run->nodes, scene, &run->barrier, err));
+    silt_size_update(run->size, &run->nodes, &run->mesh);
+    SILT_TRY(silt_run_pockets(run, err));
     // nodes of the cloud that got no cell at the start are no drops: they hold no water
     silt_locator_build(&run->locator, &run->mesh, run->nodes.x, scene->fluid.size);
     return SILT_OK;

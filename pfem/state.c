@@ -14,8 +14,8 @@
     X("bed/revision_known", STORE_LONG, run->bed_revision)
 
 #define STATE_NODES(X)                                                                                                 \
-    X("nodes/x", STORE_DOUBLE, run->nodes.x, 2)                                                                        \
-    X("nodes/v", STORE_DOUBLE, run->nodes.v, 2)                                                                        \
+    X("nodes/x", STORE_DOUBLE, run->nodes.x, D)                                                                        \
+    X("nodes/v", STORE_DOUBLE, run->nodes.v, D)                                                                        \
     X("nodes/p", STORE_DOUBLE, run->nodes.p, 1)                                                                        \
     X("nodes/debt", STORE_DOUBLE, run->nodes.debt, 1)                                                                  \
     X("nodes/id", STORE_LONG, run->nodes.id, 1)                                                                        \
@@ -25,7 +25,7 @@
 
 silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
     silt_store *store = NULL;
-    const size_t n = (size_t)run->nodes.count;
+    const size_t n = (size_t)run->nodes.count, D = (size_t)silt_nodes_dim(&run->nodes);
     silt_status status = silt_store_create(&store, path, err);
 #define PUT(name, type, value)                                                                                         \
     if (status == SILT_OK)                                                                                             \
@@ -47,6 +47,8 @@ silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
         status = silt_store_put(store, "sediment/rest", STORE_BYTE, (size_t)run->n_rest * sizeof *run->rest, run->rest, err);
     if (status == SILT_OK)
         status = silt_gauges_save(run->gauges, store, err);
+    if (status == SILT_OK && run->scene->fluid.air_pressure > 0)
+        status = silt_pockets_save(&run->pockets, store, err);
     if (status == SILT_OK && run->scene->bed.on)
         status = silt_bed_save(&run->bed, store, err);
     if (status == SILT_OK && run->coupling)
@@ -73,7 +75,8 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
     const silt_scene *scene = run->scene;
     size_t n = 0, n_index = 0;
     SILT_TRY(silt_store_count(store, "nodes/p", &n, err));
-    const double nowhere[2] = {0, 0};
+    const double nowhere[3] = {0};
+    const size_t D = (size_t)silt_nodes_dim(&run->nodes);
     for (size_t i = 0; i < n; i++)
         silt_nodes_add(&run->nodes, NODE_FLUID, -1, nowhere);
 #define TAKE(name, type, value) SILT_TRY(silt_store_take(store, name, type, 1, &(value), err));
@@ -110,11 +113,16 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
         const int64_t revision = run->mesh.revision;
         silt_mesh_connect(&run->mesh, &run->nodes);
         run->mesh.revision = revision;
+        run->mesh.walls = &run->walls;
+        silt_size_create(&run->size, scene, &run->walls);
+        silt_size_update(run->size, &run->nodes, &run->mesh);
         silt_locator_build(&run->locator, &run->mesh, run->nodes.x, scene->fluid.size);
     }
     silt_view view = {.scene = scene, .ledger = &run->ledger, .bed = scene->bed.on ? &run->bed : NULL};
     SILT_TRY(silt_gauges_create(&run->gauges, &view, err));
     SILT_TRY(silt_gauges_load(run->gauges, store, err));
+    if (scene->fluid.air_pressure > 0)
+        SILT_TRY(silt_pockets_restore(&run->pockets, &run->mesh, store, err));
     // porosity of the state that was saved
     if (run->coupling && scene->fluid.on)
         SILT_TRY(silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));

@@ -1,6 +1,6 @@
 // checks: the scene's demands on history.csv, curves against reference files and scalars against values
 
-#include "output.h"
+#include "verify.h"
 
 #include <errno.h>
 #include <unistd.h>
@@ -64,7 +64,7 @@ static silt_status history_read(verify_history *history, const silt_scene *scene
     int n = scene->n_check;
     history->column = silt_alloc((size_t)n + 1, sizeof *history->column);
     for (int i = 0; i < n; i++)
-        history->column[i] = history_find(line, scene->check[i].column);
+        history->column[i] = scene->check[i].column ? history_find(line, scene->check[i].column) : -1;
     // a last line without its end is what a killed run left, and does not count
     while ((length = getline(&line, &capacity, from)) > 0 && line[length - 1] == '\n') {
         int row = history->n_row++;
@@ -82,59 +82,6 @@ done:
     return status;
 }
 
-// ---------------------------------------------------------------- curves
-
-typedef struct verify_curve {
-    int n, capacity_x, capacity_y;
-    double *x, *y; // owned, abscissa rising
-} verify_curve;
-
-static void curve_clear(verify_curve *curve) {
-    free(curve->x);
-    free(curve->y);
-    memset(curve, 0, sizeof *curve);
-}
-
-static void curve_add(verify_curve *curve, double x, double y) {
-    SILT_RESERVE(curve->x, curve->capacity_x, curve->n + 1);
-    SILT_RESERVE(curve->y, curve->capacity_y, curve->n + 1);
-    // kept rising; files are nearly always sorted
-    int i = curve->n++;
-    for (; i > 0 && curve->x[i - 1] > x; i--) {
-        curve->x[i] = curve->x[i - 1];
-        curve->y[i] = curve->y[i - 1];
-    }
-    curve->x[i] = x;
-    curve->y[i] = y;
-}
-
-// ordinate at x, NaN outside and beside gaps
-static double curve_at(const verify_curve *curve, double x) {
-    if (curve->n == 0 || !(x >= curve->x[0] && x <= curve->x[curve->n - 1]))
-        return NAN;
-    int lo = 0, hi = curve->n - 1;
-    while (hi - lo > 1) {
-        int middle = (lo + hi) / 2;
-        *(curve->x[middle] <= x ? &lo : &hi) = middle;
-    }
-    if (x == curve->x[lo])
-        return curve->y[lo];
-    if (x == curve->x[hi])
-        return curve->y[hi];
-    return curve->y[lo] + (curve->y[hi] - curve->y[lo]) * (x - curve->x[lo]) / (curve->x[hi] - curve->x[lo]);
-}
-
-// the first abscissa where the curve has the ordinate y, NaN when it never has
-static double curve_reach(const verify_curve *curve, double y) {
-    for (int i = 0; i < curve->n; i++) {
-        if (curve->y[i] == y)
-            return curve->x[i];
-        if (i + 1 < curve->n && (curve->y[i] - y) * (curve->y[i + 1] - y) < 0)
-            return curve->x[i] + (curve->x[i + 1] - curve->x[i]) * (y - curve->y[i]) / (curve->y[i + 1] - curve->y[i]);
-    }
-    return NAN;
-}
-
 static bool inside(double x, const double window[2]) {
     return x >= window[0] && x <= window[1];
 }
@@ -145,20 +92,41 @@ static const char *plain_name(const char *path) {
     return strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
 }
 
-// the files that a scene reads: the references of its checks, then the series of its inlets; NULL: none there
-static const char *verify_file(const silt_scene *scene, int i) {
-    return i < scene->n_check ? scene->check[i].reference : scene->fluid.inlet[i - scene->n_check].series.path;
+// ---------------------------------------------------------------- copies of the scene's files
+
+/** the files that a scene reads, and the names of their copies in OUT */
+typedef struct verify_files {
+    int n, path_capacity, name_capacity;
+    char **path, **name; // owned, texts too
+} verify_files;
+
+// the plain name, or one with a number where that is taken, by another file or by what a run writes
+static const char *verify_name(void *self, const char *path) {
+    static const char *const own[] = {"history.csv", "scene.yaml", "summary.json", "run.log", "dem.log", "run.h5"};
+    verify_files *files = self;
+    const char *plain = plain_name(path);
+    bool taken = false;
+    for (int i = 0; i < files->n; i++) {
+        if (strcmp(files->path[i], path) == 0)
+            return files->name[i];
+        taken |= strcmp(files->name[i], plain) == 0;
+    }
+    for (size_t i = 0; i < sizeof own / sizeof *own; i++)
+        taken |= strcmp(plain, own[i]) == 0;
+    SILT_RESERVE(files->path, files->path_capacity, files->n + 1);
+    SILT_RESERVE(files->name, files->name_capacity, files->n + 1);
+    files->path[files->n] = silt_text("%s", path);
+    files->name[files->n] = taken ? silt_text("%d_%s", files->n, plain) : silt_text("%s", plain);
+    return files->name[files->n++];
 }
 
-// the copy of a file in OUT: its plain name, or one with a number when that name is taken
-static char *verify_copy_path(const silt_scene *scene, const char *out, int file) {
-    const char *path = verify_file(scene, file), *name = plain_name(path);
-    for (int i = 0; i < file; i++) {
-        const char *other = verify_file(scene, i);
-        if (other && strcmp(name, plain_name(other)) == 0 && strcmp(path, other) != 0)
-            return silt_text("%s/%d_%s", out, file, name);
+static void verify_files_clear(verify_files *files) {
+    for (int i = 0; i < files->n; i++) {
+        free(files->path[i]);
+        free(files->name[i]);
     }
-    return silt_text("%s/%s", out, name);
+    free(files->path);
+    free(files->name);
 }
 
 static void verify_note(silt_check_result *result, const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -170,14 +138,14 @@ static void verify_note(silt_check_result *result, const char *format, ...) {
 }
 
 // the reference's rows that `where` picks
-static bool verify_read(const silt_scene *scene, const char *out, int check, verify_curve *curve,
+static bool verify_read(const silt_scene *scene, const char *out, verify_files *files, int check, silt_curve *curve,
                         silt_check_result *result) {
     const silt_check_def *def = &scene->check[check];
     const char *wanted[3] = {def->x, def->y, def->where_column};
     int column[3] = {-1, -1, -1};
     silt_series series = {0};
     silt_error err = {0};
-    char *copy = verify_copy_path(scene, out, check);
+    char *copy = silt_text("%s/%s", out, verify_name(files, def->reference));
     bool here = access(copy, R_OK) == 0;
     silt_status status = silt_series_read(here ? NULL : scene->folder, here ? copy : def->reference, &series, &err);
     free(copy);
@@ -195,21 +163,23 @@ static bool verify_read(const silt_scene *scene, const char *out, int check, ver
     for (int i = 0; i < series.n_row && !status; i++) {
         const double *row = series.value + (size_t)i * (size_t)series.n_column;
         if (!isnan(row[column[0]]) && !isnan(row[column[1]]) && (column[2] < 0 || row[column[2]] == def->where_value))
-            curve_add(curve, row[column[0]], row[column[1]]);
+            silt_curve_add(curve, row[column[0]], row[column[1]]);
     }
     silt_series_clear(&series);
     return !status;
 }
 
-// difference of the history from the reference at the reference's abscissas
-static void verify_curve_check(const silt_scene *scene, const char *out, int check, verify_curve *history,
-                               silt_check_result *result) {
+// difference of the history, or of the profile, from the reference at the reference's abscissas
+static void verify_curve_check(const silt_scene *scene, const char *out, verify_files *files, int check,
+                               silt_curve *history, silt_check_result *result) {
     const silt_check_def *def = &scene->check[check];
-    verify_curve reference = {0};
-    if (!verify_read(scene, out, check, &reference, result))
+    silt_curve reference = {0};
+    if (!verify_read(scene, out, files, check, &reference, result))
         goto done;
-    if (!isnan(def->align)) {
-        double here = curve_reach(history, def->align), there = curve_reach(&reference, def->align);
+    if (def->kind == CHECK_PROFILE && !silt_profile_sample(scene, out, def, &reference, history, result->note))
+        goto done;
+    if (def->kind != CHECK_PROFILE && !isnan(def->align)) {
+        double here = silt_curve_reaches(history, def->align), there = silt_curve_reaches(&reference, def->align);
         if (isnan(here) || isnan(there)) {
             verify_note(result, "the %s never reaches %g, where both are to be aligned",
                         isnan(here) ? "result" : "reference", def->align);
@@ -226,7 +196,7 @@ static void verify_curve_check(const silt_scene *scene, const char *out, int che
             continue;
         wanted++;
         late += x > last;
-        double h = curve_at(history, x);
+        double h = silt_curve_at(history, x);
         if (isnan(h))
             continue;
         double scale = def->relative_to != 0 ? def->relative_to : r;
@@ -253,78 +223,17 @@ static void verify_curve_check(const silt_scene *scene, const char *out, int che
         verify_note(result, n < wanted ? "%d of %d rows of the reference" : "%d rows of the reference", n, wanted);
     }
 done:
-    curve_clear(&reference);
+    silt_curve_clear(&reference);
 }
 
-// mean over the abscissa by the trapezoidal rule
-static double scalar_mean(const verify_curve *c) {
-    double sum = 0;
-    for (int i = 1; i < c->n; i++)
-        sum += 0.5 * (c->y[i] + c->y[i - 1]) * (c->x[i] - c->x[i - 1]);
-    double length = c->x[c->n - 1] - c->x[0];
-    return length > 0 ? sum / length : c->y[0];
-}
-
-// mean distance of the upward crossings of the mean, NaN with fewer than two
-static double scalar_period(const verify_curve *c) {
-    double mean = scalar_mean(c), first = NAN, last = NAN;
-    int n = 0;
-    for (int i = 1; i < c->n; i++) {
-        double a = c->y[i - 1] - mean, b = c->y[i] - mean;
-        if (!(a < 0 && b >= 0))
-            continue;
-        last = c->x[i - 1] + (c->x[i] - c->x[i - 1]) * a / (a - b);
-        first = n++ ? first : last;
-    }
-    return n > 1 ? (last - first) / (n - 1) : NAN;
-}
-
-// least squares, NaN when all abscissas are equal
-static double scalar_slope(const verify_curve *c) {
-    double mx = 0, my = 0, xx = 0, xy = 0;
-    for (int i = 0; i < c->n; i++) {
-        mx += c->x[i] / c->n;
-        my += c->y[i] / c->n;
-    }
-    for (int i = 0; i < c->n; i++) {
-        xx += silt_square(c->x[i] - mx);
-        xy += (c->x[i] - mx) * (c->y[i] - my);
-    }
-    return xx > 0 ? xy / xx : NAN;
-}
-
-static double scalar_extreme(const verify_curve *c, double sign) {
-    double best = -HUGE_VAL;
-    for (int i = 0; i < c->n; i++)
-        best = silt_max(best, sign * c->y[i]);
-    return sign * best;
-}
-
-static double scalar_measure(const verify_curve *c, silt_scalar scalar) {
-    switch (scalar) {
-    case SCALAR_MAX:
-        return scalar_extreme(c, 1);
-    case SCALAR_MIN:
-        return scalar_extreme(c, -1);
-    case SCALAR_MEAN:
-        return scalar_mean(c);
-    case SCALAR_PERIOD:
-        return scalar_period(c);
-    case SCALAR_SLOPE:
-        return scalar_slope(c);
-    case SCALAR_LAST:
-    case SCALAR_NONE:
-        break;
-    }
-    return c->y[c->n - 1];
-}
-
-static void verify_scalar_check(const silt_check_def *def, const verify_curve *history, silt_check_result *result) {
-    verify_curve part = {0};
+static void verify_scalar_check(const silt_check_def *def, const silt_curve *history, silt_check_result *result) {
+    silt_curve part = {0};
+    const bool gaps = def->scalar == SCALAR_REACHES; // the others know no gaps
     double last = history->n ? history->x[history->n - 1] : -HUGE_VAL;
     for (int i = 0; i < history->n; i++)
-        if (inside(history->x[i], def->window) && inside(history->y[i], def->window_value))
-            curve_add(&part, history->x[i], history->y[i]);
+        if (inside(history->x[i], def->window) &&
+            (inside(history->y[i], def->window_value) || (gaps && isnan(history->y[i]))))
+            silt_curve_add(&part, history->x[i], history->y[i]);
     if (part.n == 0) {
         verify_note(result, "no data in the window");
         goto done;
@@ -334,11 +243,17 @@ static void verify_scalar_check(const silt_check_def *def, const verify_curve *h
         verify_note(result, "the result ends at %g, before the window's end %g", last, def->window[1]);
         goto done;
     }
-    result->value = scalar_measure(&part, def->scalar);
+    result->value = silt_curve_scalar(&part, def);
     if (isnan(result->value)) {
-        verify_note(result, "%s",
-                    def->scalar == SCALAR_PERIOD ? "fewer than two upward crossings of the mean in the window"
-                                                 : "fewer than two times in the window");
+        if (def->scalar == SCALAR_AT)
+            verify_note(result, "no value at %g", def->at);
+        else if (def->scalar == SCALAR_REACHES)
+            verify_note(result, "%g is never reached", def->level);
+        else
+            verify_note(result, "%s",
+                        def->scalar == SCALAR_PERIOD  ? "fewer than two upward crossings of the level in the window"
+                        : def->scalar == SCALAR_DECAY ? "fewer than three half waves in the window"
+                                                      : "fewer than two times in the window");
         goto done;
     }
     if (!isnan(def->low) || !isnan(def->high)) {
@@ -354,13 +269,15 @@ static void verify_scalar_check(const silt_check_def *def, const verify_curve *h
     }
     result->pass = result->error <= result->tolerance;
 done:
-    curve_clear(&part);
+    silt_curve_clear(&part);
 }
 
 // ---------------------------------------------------------------- all checks
 
 silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_check_result *result, silt_error *err) {
     verify_history history = {0};
+    verify_files files = {0};
+    free(silt_scene_named(scene, verify_name, &files));
     for (int i = 0; i < scene->n_check; i++) {
         const silt_check_def *def = &scene->check[i];
         result[i] = (silt_check_result){.name = def->name, .value = NAN, .reference = NAN, .error = NAN};
@@ -370,24 +287,27 @@ silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_ch
     silt_status status = scene->n_check > 0 ? history_read(&history, scene, out, err) : SILT_OK;
     for (int i = 0; i < scene->n_check && !status; i++) {
         const silt_check_def *def = &scene->check[i];
-        verify_note(&result[i], "history.csv has no column %.80s", def->column);
-        if (history.column[i] < 0)
+        const bool profile = def->kind == CHECK_PROFILE;
+        if (!profile)
+            verify_note(&result[i], "history.csv has no column %.80s", def->column);
+        if (!profile && history.column[i] < 0)
             continue;
         result[i].note[0] = 0;
-        verify_curve curve = {0};
-        for (int k = 0; k < history.n_row; k++) {
+        silt_curve curve = {0};
+        for (int k = 0; k < history.n_row && !profile; k++) {
             // gauges are NaN where they measure nothing: gaps in the curve
             double x = def->time_scale * (history.time[k] + def->time_shift);
             if (isfinite(x))
-                curve_add(&curve, x, def->scale * (history.value[k * scene->n_check + i] + def->shift));
+                silt_curve_add(&curve, x, def->scale * (history.value[k * scene->n_check + i] + def->shift));
         }
         if (def->reference)
-            verify_curve_check(scene, out, i, &curve, &result[i]);
+            verify_curve_check(scene, out, &files, i, &curve, &result[i]);
         else
             verify_scalar_check(def, &curve, &result[i]);
-        curve_clear(&curve);
+        silt_curve_clear(&curve);
     }
     history_clear(&history);
+    verify_files_clear(&files);
     return status;
 }
 
@@ -421,50 +341,28 @@ static silt_status verify_copy_one(const char *base, const char *path, const cha
     return status;
 }
 
-// the resolved scene, where files are the copies: their rows come in the order of the checks and of the inlets
-static silt_status verify_scene(const silt_scene *scene, const char *out, silt_error *err) {
-    static const char *const row[2] = {"reference: ", "series: "};
-    const int end[2] = {scene->n_check, scene->n_check + scene->fluid.n_inlet};
-    int file[2] = {0, scene->n_check};
-    char *path = silt_text("%s/scene.yaml", out), *aside = silt_text("%s.part", path);
+silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err) {
+    verify_files files = {0};
     silt_status status = SILT_OK;
-    FILE *to = fopen(aside, "w");
-    for (const char *line = scene->resolved, *next; to && *line; line = next) {
-        next = strchr(line, '\n') ? strchr(line, '\n') + 1 : line + strlen(line);
-        const char *key = line + strspn(line, " -");
-        int kind = strncmp(key, row[0], strlen(row[0])) == 0 ? 0 : strncmp(key, row[1], strlen(row[1])) == 0 ? 1 : -1;
-        while (kind >= 0 && file[kind] < end[kind] && !verify_file(scene, file[kind]))
-            file[kind]++;
-        if (kind < 0 || file[kind] == end[kind]) {
-            fwrite(line, 1, (size_t)(next - line), to);
-            continue;
-        }
-        char *copy = verify_copy_path(scene, out, file[kind]++);
-        fprintf(to, "%.*s%s\"", (int)(key - line), line, row[kind]);
-        for (const char *c = plain_name(copy); *c; c++)
-            fprintf(to, *c == '"' || *c == '\\' ? "\\%c" : "%c", *c);
-        fputs("\"\n", to);
-        free(copy);
+    char *text = silt_scene_named(scene, verify_name, &files);
+    for (int i = 0; i < files.n && !status; i++) {
+        char *to = silt_text("%s/%s", out, files.name[i]);
+        status = verify_copy_one(scene->folder, files.path[i], to, err);
+        free(to);
     }
-    if (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0)
+    char *path = silt_text("%s/scene.yaml", out), *aside = silt_text("%s.part", path);
+    FILE *to = status ? NULL : fopen(aside, "w");
+    if (to)
+        fputs(text, to);
+    if (!status && (!to || fflush(to) != 0 || ferror(to) || rename(aside, path) != 0))
         status = silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path, strerror(errno));
     if (to)
         fclose(to);
     free(aside);
     free(path);
+    free(text);
+    verify_files_clear(&files);
     return status;
-}
-
-silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err) {
-    silt_status status = SILT_OK;
-    for (int i = 0; i < scene->n_check + scene->fluid.n_inlet && !status; i++) {
-        if (!verify_file(scene, i))
-            continue;
-        char *to = verify_copy_path(scene, out, i);
-        status = verify_copy_one(scene->folder, verify_file(scene, i), to, err);
-        free(to);
-    }
-    return status ? status : verify_scene(scene, out, err);
 }
 
 static void verify_print(FILE *to, int width, double value) {

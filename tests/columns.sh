@@ -32,7 +32,7 @@ for scene in "$@"; do
         grep -q "\`$key\`" "$doc" || fail "key $key of summary.json is not in $doc"
     done
     for file in "$out"/*; do
-        name=$(basename "$file" | sed 's/_[0-9]\{6\}\./_NNNNNN./; s/^bed_NNNNNN.*\|^grains_NNNNNN.*\|^bodies_NNNNNN.*/fluid_NNNNNN.hdf/; s/^[a-z]*\.hdf\.series/fluid.hdf.series/')
+        name=$(basename "$file" | sed 's/_[0-9]\{6\}\./_NNNNNN./; s/^surface_NNNNNN.*\|^bed_NNNNNN.*\|^grains_NNNNNN.*\|^bodies_NNNNNN.*/fluid_NNNNNN.hdf/; s/^[a-z]*\.hdf\.series/fluid.hdf.series/')
         case $name in
         *.csv) [ "$name" != history.csv ] || grep -q "\`$name\`" "$doc" || fail "$name is not in $doc" ;;
         *) grep -q "\`$name\`" "$doc" || fail "file $name is not in $doc" ;;

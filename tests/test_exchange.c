@@ -413,7 +413,8 @@ static void test_a_step_of_the_water_closes(void **unused) {
                     t.nodes.p[i] = 0;
                 }
                 OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, dt, &error));
-                OK(silt_fluid_step(&fluid, &scene, &walls, &t.nodes, &t.mesh, &e->drag, dt, &error));
+                const silt_step step = {.scene = &scene, .walls = &walls, .mesh = &t.mesh, .drag = &e->drag, .nodes = &t.nodes, .dt = dt};
+                OK(silt_fluid_step(&fluid, &step, &error));
                 silt_exchange_load(e, fluid.w, t.nodes.p, dt);
                 double scale = 0, gained[2] = {0, 0};
                 for (int p = 0; p < e->n_grain; p++)

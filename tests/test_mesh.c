@@ -22,7 +22,7 @@ static silt_scene *scene_of(const char *text) {
 }
 
 #define HEAD "silt: 1\ndimension: 2\ntime: {end: 1, output: 1}\ngravity: [0, -9.81]\n"
-#define WATER "fluid:\n  density: 1000\n  viscosity: 0\n  size: 0.05\n  jitter: 0.2\n"
+#define WATER "fluid:\n  flow: laminar\n  theta: 0.55\n  density: 1000\n  viscosity: 0\n  size: 0.05\n  jitter: 0.2\n"
 
 typedef struct bench {
     silt_scene *scene;
@@ -37,7 +37,7 @@ typedef struct bench {
 
 static void bench_open(bench *b, const char *text) {
     *b = (bench){.scene = scene_of(text)};
-    silt_walls_create(&b->walls, b->scene);
+    silt_walls_create(&b->walls, b->scene, NULL);
     b->barrier.walls = &b->walls;
     silt_nodes_seed(&b->nodes, b->scene, &b->walls, NULL, NULL);
     silt_error err = {0};

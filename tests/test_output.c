@@ -191,22 +191,22 @@ static void test_store_failures(void **state) {
 static void test_gauges(void **state) {
     (void)state;
     silt_gauge_def def[] = {
-        {"front", GAUGE_FRONT, {1}, {0}},
-        {"back", GAUGE_FRONT, {-1}, {0}},
-        {"level", GAUGE_HEIGHT, {0.25}, {0}},
-        {"spray", GAUGE_HEIGHT, {2.1}, {0}},
-        {"in", GAUGE_WETTED, {0.5, 0.5}, {0}},
-        {"out", GAUGE_WETTED, {1.5, 0.5}, {0}},
-        {"p", GAUGE_PRESSURE, {0.25, 0.75}, {0}},
-        {"p_wall", GAUGE_PRESSURE, {-0.01, 0.5}, {0}},
-        {"p_dry", GAUGE_PRESSURE, {-0.1, 0.5}, {0}},
-        {"v", GAUGE_VELOCITY, {0.75, 0.25}, {0}},
-        {"q", GAUGE_DISCHARGE, {0.5, 0}, {0.5, 1}},
-        {"q_back", GAUGE_DISCHARGE, {0.5, 2}, {0.5, -1}},
-        {"q_edge", GAUGE_DISCHARGE, {0, 0}, {1, 1}},
-        {"bed", GAUGE_BED_LEVEL, {0.5}, {0}},
-        {"no_bed", GAUGE_BED_LEVEL, {5}, {0}},
-        {"scour", GAUGE_SCOUR, {0.5}, {0}},
+        {.name = "front", .kind = GAUGE_FRONT, .from = {1}},
+        {.name = "back", .kind = GAUGE_FRONT, .from = {-1}},
+        {.name = "level", .kind = GAUGE_HEIGHT, .from = {0.25}},
+        {.name = "spray", .kind = GAUGE_HEIGHT, .from = {2.1}},
+        {.name = "in", .kind = GAUGE_WETTED, .from = {0.5, 0.5}},
+        {.name = "out", .kind = GAUGE_WETTED, .from = {1.5, 0.5}},
+        {.name = "p", .kind = GAUGE_PRESSURE, .from = {0.25, 0.75}},
+        {.name = "p_wall", .kind = GAUGE_PRESSURE, .from = {-0.01, 0.5}},
+        {.name = "p_dry", .kind = GAUGE_PRESSURE, .from = {-0.1, 0.5}},
+        {.name = "v", .kind = GAUGE_VELOCITY, .from = {0.75, 0.25}},
+        {.name = "q", .kind = GAUGE_DISCHARGE, .from = {0.5, 0}, .to = {0.5, 1}},
+        {.name = "q_back", .kind = GAUGE_DISCHARGE, .from = {0.5, 2}, .to = {0.5, -1}},
+        {.name = "q_edge", .kind = GAUGE_DISCHARGE, .from = {0, 0}, .to = {1, 1}},
+        {.name = "bed", .kind = GAUGE_BED_LEVEL, .from = {0.5}},
+        {.name = "no_bed", .kind = GAUGE_BED_LEVEL, .from = {5}},
+        {.name = "scour", .kind = GAUGE_SCOUR, .from = {0.5}},
     };
     world w;
     silt_error err = {0};
@@ -269,7 +269,8 @@ static void test_gauges(void **state) {
 #define WATER                                                                                                          \
     "step,time,dt,n_node,n_cell,fluid_volume,flying_volume,mesh_volume,fluid_mass,volume_error,kinetic_energy,"        \
     "potential_energy,momentum_x,momentum_y,momentum_z,momentum_error,external_work,dissipation,max_speed,volume_solved,"        \
-    "volume_moved,volume_reconnected,"
+    "volume_moved,volume_reconnected,volume_refined,volume_given,volume_owed,y_plus,angular_momentum_x,"               \
+    "angular_momentum_y,angular_momentum_z,"
 #define GRAIN_FORCES                                                                                                   \
     "grain_velocity_x,grain_velocity_y,grain_velocity_z,grain_water_x,grain_water_y,grain_water_z,grain_contact_x,"    \
     "grain_contact_y,grain_contact_z,"
@@ -279,7 +280,7 @@ static void test_history_columns(void **state) {
     world w;
     silt_error err = {0};
     silt_history *history = NULL;
-    silt_gauge_def gauge[] = {{"v", GAUGE_VELOCITY, {0}, {0}}, {"q", GAUGE_DISCHARGE, {0}, {0}}};
+    silt_gauge_def gauge[] = {{.name = "v", .kind = GAUGE_VELOCITY, .from = {0}}, {.name = "q", .kind = GAUGE_DISCHARGE, .from = {0}}};
     world_make(&w);
     assert_int_equal(silt_history_create(&history, folder, &w.scene, &err), SILT_OK);
     assert_int_equal(silt_history_close(&history, &err), SILT_OK);
@@ -324,7 +325,7 @@ static void test_history_reopen(void **state) {
     world w;
     silt_error err = {0};
     silt_history *history = NULL;
-    silt_gauge_def gauge[] = {{"level", GAUGE_HEIGHT, {0}, {0}}};
+    silt_gauge_def gauge[] = {{.name = "level", .kind = GAUGE_HEIGHT, .from = {0}}};
     world_full(&w);
     w.scene.gauge = gauge;
     w.scene.n_gauge = 1;
@@ -490,7 +491,7 @@ static void test_frames_empty(void **state) {
 
 static void test_draw(void **state) {
     (void)state;
-    static const char *const field[] = {"speed", "pressure", "porosity", "mesh", "bed"};
+    static const char *const field[] = {"speed", "pressure", "porosity", "elevation", "vorticity", "mesh", "bed"};
     world w;
     silt_error err = {0};
     struct stat file;
@@ -498,27 +499,27 @@ static void test_draw(void **state) {
     mkdir(place("draw"), 0777);
     make("draw/scene.yaml", SCENE);
     make("draw/curve.csv", "t,x\n1,1\n2,4\n");
-    assert_int_equal(silt_draw(place("draw"), -2, NULL, NULL, NULL, &err), SILT_FAILED);
+    assert_int_equal(silt_draw(place("draw"), -2, NULL, NULL, NULL, NULL, &err), SILT_FAILED);
     contains(err.text, "has no frames");
     for (int i = 0; i < 2; i++) {
         w.view.time = i;
         assert_int_equal(silt_frame_write(place("draw"), i, &w.view, &err), SILT_OK);
     }
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 7; i++) {
         unlink(place("draw/picture_000001.png"));
-        if (silt_draw(place("draw"), -2, field[i], NULL, NULL, &err))
+        if (silt_draw(place("draw"), -2, field[i], NULL, NULL, NULL, &err))
             fail_msg("%s", err.text);
         assert_false(exists("draw/picture_000000.png"));
         assert_int_equal(stat(place("draw/picture_000001.png"), &file), 0);
         assert_true(file.st_size > 4000);
     }
     assert_memory_equal(content("draw/picture_000001.png"), "\x89PNG", 4);
-    assert_int_equal(silt_draw(place("draw"), -1, "mesh", NULL, NULL, &err), SILT_OK);
+    assert_int_equal(silt_draw(place("draw"), -1, "mesh", NULL, NULL, NULL, &err), SILT_OK);
     assert_true(exists("draw/picture_000000.png"));
-    assert_int_equal(silt_draw(place("draw"), 7, NULL, NULL, NULL, &err), SILT_INPUT);
+    assert_int_equal(silt_draw(place("draw"), 7, NULL, NULL, NULL, NULL, &err), SILT_INPUT);
     contains(err.text, "has no frame 7; its frames are 0 to 1");
-    assert_int_equal(silt_draw(place("draw"), 0, "colour", NULL, NULL, &err), SILT_INPUT);
-    contains(err.text, "field colour is not known: mesh, pressure, speed, porosity or bed");
+    assert_int_equal(silt_draw(place("draw"), 0, "colour", NULL, NULL, NULL, &err), SILT_INPUT);
+    contains(err.text, "field colour is not known: mesh, pressure, speed, elevation, vorticity, porosity or bed");
     silt_locator_clear(&w.locator);
 }
 

@@ -25,7 +25,7 @@ static void begin(silt_run *run, silt_scene **scene, const char *path, int n_set
         fail_msg("%s", err.text);
     snprintf(folder, sizeof folder, "%s/tests/run-XXXXXX", SILT_BINARY);
     assert_non_null(mkdtemp(folder));
-    run_begin(run, *scene, &def, folder, -1);
+    run_begin(run, *scene, &def, folder, -1, NULL);
     if (run_start(run, &err) != SILT_OK)
         fail_msg("%s", err.text);
 }

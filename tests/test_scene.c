@@ -14,9 +14,9 @@
 static char folder[4096]; // temporary
 
 static const char *place(const char *name) {
-    static char path[8][4200];
+    static char path[32][4400];
     static int i;
-    i = (i + 1) % 8;
+    i = (i + 1) % 32;
     snprintf(path[i], sizeof path[i], "%s/%s", folder, name);
     return path[i];
 }
@@ -107,7 +107,7 @@ static void test_wrong(void **state) {
         n_file++;
     }
     closedir(dir);
-    assert_true(n_file >= 100);
+    assert_true(n_file >= 200);
 }
 
 static void test_broken_files(void **state) {
@@ -194,7 +194,12 @@ static void test_whole(void **state) {
     assert_true(s->gravity[0] == 0 && s->gravity[1] == -9.81 && s->gravity[2] == 0);
     const silt_fluid_def *f = &s->fluid;
     assert_true(f->on && f->density == 1000 && f->viscosity == 0.001 && f->size == 0.02);
-    assert_true(f->scheme == SCHEME_FRACTIONAL && f->pressure == PRESSURE_CONSISTENT && f->theta == 0.55);
+    assert_true(f->scheme == SCHEME_FRACTIONAL && f->pressure == PRESSURE_CONSISTENT && f->theta == 0.5);
+    assert_true(f->flow == FLOW_TURBULENT && f->turbulence == TURBULENCE_MIXING_LENGTH && f->wall_height == 2);
+    assert_true(f->rheology == RHEOLOGY_NEWTONIAN && f->yield_stress == 0 && f->flow_index == 1 && f->order == 2);
+    assert_true(f->plastic_rate == 1e-3 && f->shuffle == 0 && f->n_size == 0 && f->size_growth == 0.3 && !f->cloud);
+    assert_true(f->air_pressure == 0 && f->air_exponent == 1.4 && f->force.kind == FORMULA_NONE);
+    assert_true(s->period[0] == 0 && s->period[1] == 0 && isnan(f->outlet[0].level) && f->inlet[0].head.n_row == 0);
     assert_true(f->alpha == 1.3 && f->merge == 0.3 && f->tolerance == 1e-6 && f->iterations == 12);
     assert_true(f->volume_control && f->volume_steps == 15 && f->jitter == 0 && f->seed == 1);
     assert_int_equal(f->n_region, 3);
@@ -212,7 +217,8 @@ static void test_whole(void **state) {
     assert_int_equal(s->n_wall, 3);
     assert_true(!s->wall[0].closed && s->wall[0].condition == WALL_SLIP && s->wall[0].n_point == 3);
     const double outline[12] = {-1, -1, 0, 7, -1, 0, 7, 3, 0, -1, 3, 0};
-    assert_true(s->wall[1].closed && s->wall[1].n_point == 4 && s->wall[1].condition == WALL_NO_SLIP);
+    assert_true(s->wall[1].closed && s->wall[1].n_point == 4 && s->wall[1].condition == WALL_LAW);
+    assert_true(s->wall[1].form == WALL_POLYLINE && s->wall[1].hi[0] < s->wall[1].lo[0] && !s->wall[1].motion.n_row);
     assert_memory_equal(s->wall[1].point, outline, sizeof outline);
     assert_true(s->wall[2].closed && s->wall[2].n_point == 3);
     const silt_bed_def *b = &s->bed;
@@ -259,6 +265,136 @@ static void test_whole(void **state) {
     silt_scene_free(&s);
 }
 
+// what the fluid and its walls can be besides, in the plane
+static void test_water(void **state) {
+    (void)state;
+    silt_scene *s = right(RIGHT "water.yaml", 0, NULL);
+    const silt_fluid_def *f = &s->fluid;
+    assert_true(s->period[0] == 0 && s->period[1] == 6);
+    assert_true(f->flow == FLOW_LAMINAR && f->turbulence == TURBULENCE_NONE && f->wall_height == 1.5);
+    assert_true(f->rheology == RHEOLOGY_HERSCHEL_BULKLEY && f->yield_stress == 30 && f->flow_index == 0.5);
+    assert_true(f->plastic_rate == 0.01 && f->order == 1 && f->theta == 1 && f->shuffle == 0.1);
+    assert_true(f->size_growth == 0.2 && f->air_pressure == 101325 && f->air_exponent == 1 && f->cloud[0] == '/');
+    // the outline is given clockwise
+    const double turned[12] = {2, 0, 0, 3, 0, 0, 3, 0.5, 0, 2, 0.5, 0};
+    assert_true(f->region[1].kind == REGION_POLYGON && f->region[1].n_point == 4 && f->region[1].outline[0] == '/');
+    assert_memory_equal(f->region[1].point, turned, sizeof turned);
+    assert_true(f->n_size == 5 && f->size_at[0].near == NEAR_REGION && f->size_at[0].region.kind == REGION_BOX);
+    assert_true(f->size_at[0].size == 0.02 && f->size_at[0].distance == 0 && f->size_at[1].distance == 0.1);
+    assert_true(f->size_at[1].region.kind == REGION_CIRCLE && f->size_at[1].region.radius == 0.2);
+    assert_true(f->size_at[2].region.n_point == 4 && f->size_at[3].near == NEAR_WALLS);
+    assert_true(f->size_at[4].near == NEAR_SURFACE && f->size_at[4].region.kind == 0);
+    assert_true(f->inlet[0].drive == INLET_HEAD && silt_series_at(&f->inlet[0].head, 1, 5) == 1.25);
+    assert_true(f->outlet[0].level == 0.4);
+    double v[3];
+    silt_formula_acceleration(&f->force, 0.25, (double[]){7, 8}, v);
+    assert_true(v[0] == 0.5 && v[1] == 0.5 && v[2] == 0);
+    // columns of the field stand in another order in the file
+    silt_formula_velocity(&f->velocity, 9.81, (double[]){0.5, 0.25}, v);
+    assert_true(fabs(v[0] - 0.5) < 1e-14 && fabs(v[1] - 3.5) < 1e-14 && v[2] == 0);
+    assert_true(s->wall[0].condition == WALL_LAW && s->wall[1].condition == WALL_NO_SLIP &&
+                s->wall[2].velocity[0] == 1);
+    assert_true(s->wall[1].motion.n_row == 2 && silt_series_column(&s->wall[1].motion, "angle") == 1);
+    assert_true(s->wall[1].pivot[1] == 2 && s->wall[1].form == WALL_POLYLINE);
+    silt_scene_free(&s);
+
+    // defaults that hang on other keys, and what they become in words
+    static const struct {
+        const char *set;
+        silt_turbulence turbulence;
+        double theta;
+        silt_condition condition;
+    } expected[] = {{"fluid.order=2", TURBULENCE_MIXING_LENGTH, 0.5, WALL_LAW},
+                    {"fluid.order=1", TURBULENCE_MIXING_LENGTH, 1, WALL_LAW},
+                    {"fluid.theta=0.7", TURBULENCE_MIXING_LENGTH, 0.7, WALL_LAW},
+                    {"fluid.flow=laminar", TURBULENCE_NONE, 0.5, WALL_NO_SLIP},
+                    {"fluid.turbulence=none", TURBULENCE_NONE, 0.5, WALL_LAW},
+                    {"fluid.turbulence=smagorinsky", TURBULENCE_SMAGORINSKY, 0.5, WALL_LAW},
+                    {"walls.0.condition=slip", TURBULENCE_MIXING_LENGTH, 0.5, WALL_SLIP}};
+    const char *path = make_text("tank.yaml", HEAD WATER "walls: [{box: [[0, 0], [2, 2]]}]\n");
+    for (int i = 0; i < (int)(sizeof expected / sizeof *expected); i++) {
+        s = right(path, 1, &expected[i].set);
+        assert_true(s->fluid.turbulence == expected[i].turbulence && s->fluid.theta == expected[i].theta);
+        assert_int_equal(s->wall[0].condition, expected[i].condition);
+        assert_null(strstr(s->resolved, "default"));
+        assert_null(strstr(s->resolved, "auto"));
+        silt_scene_free(&s);
+    }
+}
+
+static void test_space(void **state) {
+    (void)state;
+    silt_scene *s = right(RIGHT "space.yaml", 0, NULL);
+    const silt_fluid_def *f = &s->fluid;
+    assert_true(s->dimension == 3 && s->gravity[2] == -9.81 && silt_scene_up(s) == 2 && s->period[1] == 3);
+    assert_true(f->flow == FLOW_TURBULENT && f->turbulence == TURBULENCE_WALE && f->theta == 0.6);
+    const silt_region *r = f->region;
+    double lo[3], hi[3];
+    for (int i = 0; i < 4; i++)
+        assert_true(silt_region_space(&r[i]));
+    assert_true(r[0].hi[2] == 0.55 && fabs(silt_region_area(&r[0]) - 0.55) < 1e-15);
+    assert_true(silt_region_contains(&r[0], (double[]){0.5, 0.5, 0.5}) &&
+                !silt_region_contains(&r[0], (double[]){0.5, 0.5, 0.6}));
+    // a wedge
+    assert_true(r[1].lo[1] == 0 && r[1].hi[1] == 1 && silt_region_area(&r[1]) == 0.25);
+    assert_true(silt_region_contains(&r[1], (double[]){1.1, 0.9, 0.1}) &&
+                !silt_region_contains(&r[1], (double[]){1.9, 0.9, 0.1}) &&
+                !silt_region_contains(&r[1], (double[]){1.1, 1.1, 0.1}));
+    silt_region_bounds(&r[1], lo, hi);
+    assert_true(lo[0] == 1 && lo[1] == 0 && lo[2] == 0 && hi[0] == 2 && hi[1] == 1 && hi[2] == 0.5);
+    assert_true(r[2].kind == REGION_SPHERE && fabs(silt_region_area(&r[2]) - 4e-3 * M_PI / 3) < 1e-15);
+    assert_true(silt_region_contains(&r[2], (double[]){2, 0.5, 0.89}) &&
+                !silt_region_contains(&r[2], (double[]){2.08, 0.5, 0.88}));
+    assert_true(r[3].n_point == 4 && r[3].lo[1] == 0.2 && r[3].hi[1] == 0.4);
+    assert_true(silt_region_contains(&r[3], (double[]){0.9, 0.3, 0.2}) &&
+                !silt_region_contains(&r[3], (double[]){0.9, 0.3, 0.9}));
+    assert_true(f->size_at[0].region.kind == REGION_SPHERE && f->size_at[1].region.hi[1] == 1);
+    double v[3];
+    silt_formula_velocity(&f->velocity, 9.81, (double[]){2, 2, 5}, v);
+    assert_true(v[0] == 6 && v[1] == 0 && v[2] == -2);
+    silt_formula_acceleration(&f->force, 0, (double[]){2, 3, 5}, v);
+    assert_true(v[0] == 4 && v[1] == 8 && v[2] == 0);
+    const silt_wall *w = s->wall;
+    assert_true(w[0].form == WALL_BOX && w[0].n_point == 0 && w[0].hi[2] == 2 && w[0].condition == WALL_SLIP);
+    assert_true(w[0].velocity[1] == 1 && !w[0].surface);
+    assert_true(w[1].form == WALL_SURFACE && w[1].surface[0] == '/' && w[1].scale == 0.001 && w[1].inside_out);
+    assert_true(w[1].hi[0] < w[1].lo[0] && w[1].condition == WALL_LAW && w[1].motion.n_row == 2 && w[1].pivot[2] == 2);
+    const silt_gauge_def *g = s->gauge;
+    assert_true(g[0].kind == GAUGE_HEIGHT && g[0].from[0] == 0.5 && g[0].from[1] == 0.5 && g[0].from[2] == 0);
+    assert_true(g[1].from[2] == 0.25 && g[2].from[2] == 0 && g[4].from[0] == 1);
+    silt_scene_free(&s);
+    // a field in space
+    s = right(RIGHT "space.yaml", 1, (const char *[]){"fluid.velocity={formula: field, file: points3.csv}"});
+    silt_formula_velocity(&s->fluid.velocity, 9.81, (double[]){0.1, 0.2, 0.3}, v);
+    assert_true(fabs(v[0] - 0.1) + fabs(v[1] - 0.2) + fabs(v[2] - 0.3) < 1e-14);
+    silt_scene_free(&s);
+}
+
+// another content of a file is another scene
+static void test_contents(void **state) {
+    (void)state;
+    const char *path =
+        make_text("wave.yaml", HEAD "fluid: {density: 1, viscosity: 1, size: 0.1, regions: [{outline: o.csv}], "
+                                    "cloud: c.csv, body_force: {formula: series, file: f.csv}}\n"
+                                    "walls: [{box: [[0, 0], [9, 9]], motion: m.csv}]\n");
+    static const char *const file[4][3] = {{"o.csv", "x,y\n0,0\n1,0\n1,1\n", "x,y\n0,0\n1,0\n1,2\n"},
+                                           {"c.csv", "x,y\n0,0\n1,0\n1,1\n", "x,y\n0,0\n1,0\n1,0.5\n"},
+                                           {"f.csv", "t,x\n0,0\n", "t,x\n0,1\n"},
+                                           {"m.csv", "t,x\n0,0\n", "t,x\n0,1\n"}};
+    for (int i = 0; i < 4; i++)
+        make_text(file[i][0], file[i][1]);
+    silt_scene *s = right(path, 0, NULL);
+    for (int i = 0; i < 4; i++) {
+        make_text(file[i][0], file[i][2]);
+        silt_scene *t = right(path, 0, NULL);
+        assert_string_equal(t->resolved, s->resolved);
+        assert_true(t->hash != s->hash);
+        silt_scene_free(&t);
+        make_text(file[i][0], file[i][1]);
+    }
+    silt_scene_free(&s);
+}
+
 // all numbers of two scenes are the same bits
 static void same_scene(const silt_scene *a, const silt_scene *b) {
     assert_string_equal(a->resolved, b->resolved);
@@ -266,8 +402,18 @@ static void same_scene(const silt_scene *a, const silt_scene *b) {
     assert_memory_equal(&a->time, &b->time, sizeof a->time);
     assert_memory_equal(a->gravity, b->gravity, sizeof a->gravity);
     assert_memory_equal(&a->contact, &b->contact, sizeof a->contact);
+    assert_true(a->dimension == b->dimension && memcmp(a->period, b->period, sizeof a->period) == 0);
     assert_memory_equal(&a->fluid, &b->fluid, offsetof(silt_fluid_def, n_region));
-    assert_memory_equal(&a->fluid.velocity, &b->fluid.velocity, sizeof a->fluid.velocity);
+    assert_memory_equal(&a->fluid.velocity, &b->fluid.velocity, offsetof(silt_formula, series));
+    assert_memory_equal(&a->fluid.force, &b->fluid.force, offsetof(silt_formula, series));
+    assert_true(a->fluid.shuffle == b->fluid.shuffle && a->fluid.size_growth == b->fluid.size_growth);
+    assert_true(a->fluid.air_pressure == b->fluid.air_pressure && a->fluid.air_exponent == b->fluid.air_exponent);
+    assert_int_equal(a->fluid.n_size, b->fluid.n_size);
+    for (int i = 0; i < a->fluid.n_size; i++) {
+        const silt_size_def *p = &a->fluid.size_at[i], *q = &b->fluid.size_at[i];
+        assert_true(p->near == q->near && p->size == q->size && p->distance == q->distance &&
+                    p->region.kind == q->region.kind && p->region.n_point == q->region.n_point);
+    }
     assert_memory_equal(&a->bed, &b->bed, offsetof(silt_bed_def, n_region));
     assert_memory_equal(&a->grains, &b->grains, offsetof(silt_grains_def, n_grain));
     assert_int_equal(a->fluid.n_region, b->fluid.n_region);
@@ -282,7 +428,14 @@ static void same_scene(const silt_scene *a, const silt_scene *b) {
     for (int i = 0; i < a->n_wall; i++) {
         assert_true(a->wall[i].n_point == b->wall[i].n_point && a->wall[i].closed == b->wall[i].closed &&
                     a->wall[i].condition == b->wall[i].condition);
-        assert_memory_equal(a->wall[i].point, b->wall[i].point, (size_t)a->wall[i].n_point * 24);
+        if (a->wall[i].n_point)
+            assert_memory_equal(a->wall[i].point, b->wall[i].point, (size_t)a->wall[i].n_point * 24);
+        assert_true(a->wall[i].form == b->wall[i].form && a->wall[i].roughness == b->wall[i].roughness &&
+                    a->wall[i].scale == b->wall[i].scale && a->wall[i].inside_out == b->wall[i].inside_out &&
+                    a->wall[i].motion.n_row == b->wall[i].motion.n_row);
+        assert_memory_equal(a->wall[i].lo, b->wall[i].lo, 48);
+        assert_memory_equal(a->wall[i].velocity, b->wall[i].velocity, 24);
+        assert_memory_equal(a->wall[i].pivot, b->wall[i].pivot, 24);
     }
     assert_int_equal(a->grains.n_grain, b->grains.n_grain);
     if (a->grains.n_grain)
@@ -302,9 +455,11 @@ static void same_scene(const silt_scene *a, const silt_scene *b) {
 
 static void test_resolved(void **state) {
     (void)state;
-    static const char *const file[] = {RIGHT "whole.yaml", RIGHT "dry.yaml", RIGHT "plain.yaml", RIGHT "plain.json"};
-    for (int i = 0; i < 4; i++) {
-        const char *set[] = {"time.end=0.1", "gravity=[0.1, -9.80665]", "title='a: #b'"};
+    static const char *const file[] = {RIGHT "whole.yaml", RIGHT "dry.yaml",   RIGHT "plain.yaml",
+                                       RIGHT "plain.json", RIGHT "water.yaml", RIGHT "space.yaml"};
+    for (int i = 0; i < 6; i++) {
+        const char *set[] = {"time.end=0.1", i == 5 ? "gravity=[0.1, 1, 0]" : "gravity=[0.1, -9.80665]",
+                             "title='a: #b'"};
         silt_scene *a = right(file[i], i % 2 ? 3 : 0, set);
         silt_scene *b = right(make_text("resolved.yaml", a->resolved), 0, NULL);
         same_scene(a, b);
@@ -426,8 +581,7 @@ static void test_set(void **state) {
         {"fluid.regions.1.polygon=[[0, 0], [1, 0], [2, 0]]",
          ":1:25: key 'fluid.regions.1.polygon': found a polygon without"},
         {"title=\xff", ":1:1: found no path=value"},
-        {"dimension=3",
-         "-D dimension=3:1:11: key 'dimension': found 3, allowed 2: three dimensions are not there yet"}};
+        {"dimension=4", "-D dimension=4:1:11: key 'dimension': found '4', allowed an integer, 2 to 3"}};
     for (int i = 0; i < (int)(sizeof bad / sizeof *bad); i++)
         wrong(RIGHT "whole.yaml", 1, bad[i], 1, bad[i][1]);
     wrong(RIGHT "whole.yaml", 2, (const char *[]){"time.end=x", "fluid.size=y"}, 2,
@@ -491,7 +645,7 @@ static void test_help(void **state) {
     assert_int_equal(silt_scene_help("walls", to, &err), SILT_OK);
     fclose(to);
     assert_non_null(strstr(text, "of a box; 0: as wide as high; only with shape: box"));
-    assert_non_null(strstr(text, "the last point is joined to the first\n"));
+    assert_non_null(strstr(text, "the last point is joined to the first; only with polyline or box; 2-D only\n"));
     free(text);
     to = open_memstream(&text, &size);
     assert_int_equal(silt_scene_help("fluid.densty", to, &err), SILT_INPUT);
@@ -541,15 +695,13 @@ static void test_columns(void **state) {
 }
 
 // random damage: read or refused, and what is read must survive its own resolved text
-static void test_damage(void **state) {
-    (void)state;
+static void damage(const char *name, int rounds, uint64_t seed) {
     size_t size;
-    char *good = slurp(RIGHT "whole.yaml", &size), *text = silt_alloc(2 * size, 1);
-    make_text("hydrograph.csv", "time,factor\n0,0\n1,1\n");
-    make_text("curve.csv", "t,x,run\n0,1,1\n");
+    char path[4200];
+    snprintf(path, sizeof path, RIGHT "%s", name);
+    char *good = slurp(path, &size), *text = silt_alloc(2 * size, 1);
     static const char token[] = "{}[],:&*!|>'\"%@`#-? \n\t\\.0123456789einfanx~<=\x80\xff\xc3\xa9";
-    uint64_t seed = 2024;
-    int n_right = 0, n_wrong = 0, rounds = 4000;
+    int n_right = 0, n_wrong = 0;
     for (int round = 0; round < rounds; round++) {
         size_t n = size;
         memcpy(text, good, size);
@@ -581,8 +733,8 @@ static void test_damage(void **state) {
         // -D gets its share of the damage
         char set[32] = {0};
         memcpy(set, text + silt_random(&seed) % (n - 31), 31);
-        const char *path = make("damage.yaml", text, n), *one = set;
-        silt_status status = silt_scene_read(path, round % 8 == 0, &one, &scene, &err);
+        const char *damaged = make("damage.yaml", text, n), *one = set;
+        silt_status status = silt_scene_read(damaged, round % 8 == 0, &one, &scene, &err);
         if (status == SILT_OK) {
             n_right++;
             again = right(make_text("again.yaml", scene->resolved), 0, NULL);
@@ -603,6 +755,26 @@ static void test_damage(void **state) {
     free(text);
 }
 
+static void test_damage(void **state) {
+    (void)state;
+    // the files that the scenes name
+    DIR *dir = opendir(RIGHT);
+    assert_non_null(dir);
+    for (struct dirent *entry; (entry = readdir(dir));)
+        if (strstr(entry->d_name, ".csv") || strstr(entry->d_name, ".stl")) {
+            char path[4200];
+            size_t size;
+            snprintf(path, sizeof path, RIGHT "%s", entry->d_name);
+            char *text = slurp(path, &size);
+            make(entry->d_name, text, size);
+            free(text);
+        }
+    closedir(dir);
+    damage("whole.yaml", 4000, 2024);
+    damage("water.yaml", 3000, 2025);
+    damage("space.yaml", 3000, 2026);
+}
+
 int main(int argc, char **argv) {
     if (argc > 1 && strcmp(argv[1], "document") == 0) {
         silt_scene_document(stdout);
@@ -616,7 +788,8 @@ int main(int argc, char **argv) {
         cmocka_unit_test(test_whole),       cmocka_unit_test(test_resolved), cmocka_unit_test(test_moved),
         cmocka_unit_test(test_set),         cmocka_unit_test(test_wrong),    cmocka_unit_test(test_broken_files),
         cmocka_unit_test(test_many_errors), cmocka_unit_test(test_columns),  cmocka_unit_test(test_cases),
-        cmocka_unit_test(test_damage),
+        cmocka_unit_test(test_damage),      cmocka_unit_test(test_water),    cmocka_unit_test(test_space),
+        cmocka_unit_test(test_contents),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
     char command[4300];

@@ -23,6 +23,10 @@ static silt_check_def check_of(const char *name, const char *column) {
                             .time_scale = 1,
                             .scale = 1,
                             .align = NAN,
+                            .kind = CHECK_COLUMN,
+                            .place_scale = 1,
+                            .at = NAN,
+                            .level = NAN,
                             .window = {-HUGE_VAL, HUGE_VAL},
                             .window_value = {-HUGE_VAL, HUGE_VAL},
                             .norm = NORM_L2,
@@ -69,8 +73,44 @@ static void test_checks_scalar(void **state) {
     assert_false(r.pass);
     near(scalar("external_work", SCALAR_LAST, 0, 2, 0).error, 1, 1e-12);
 
+    // the value at an abscissa, between two rows; half of the swing
+    silt_check_def def = check_of("at", "front");
+    def.scalar = SCALAR_AT;
+    def.at = 2.0025;
+    def.value = 0.5 * (silt_square(2) + silt_square(2.005));
+    near(measure(&def).error, 0, 1e-12);
+    def.at = 11;
+    r = measure(&def);
+    assert_false(r.pass);
+    contains(r.note, "no value at 11");
+    near(scalar("wave", SCALAR_AMPLITUDE, 0, 10, 0.5).value, 0.5, 1e-4);
+
+    // when it is reached: upwards, downwards, out of a gap, never
+    def = check_of("reaches", "front");
+    def.scalar = SCALAR_REACHES;
+    def.level = 6.25;
+    near(measure(&def).value, 2.5, 1e-6);
+    def.column = (char *)(uintptr_t) "external_work";
+    def.level = -1.006;
+    near(measure(&def).value, 2.0024, 1e-12);
+    def.column = (char *)(uintptr_t) "gap";
+    def.level = 1;
+    near(measure(&def).value, 5, 1e-12);
+    def.level = 5.5025;
+    near(measure(&def).value, 5.5025, 1e-12);
+    def.level = 77;
+    r = measure(&def);
+    assert_false(r.pass);
+    contains(r.note, "77 is never reached");
+
+    // crossings of a level instead of the mean
+    def = check_of("period", "wave");
+    def.scalar = SCALAR_PERIOD;
+    def.level = 3;
+    near(measure(&def).value, 1.7, 1e-5);
+
     // a range
-    silt_check_def def = check_of("range", "external_work");
+    def = check_of("range", "external_work");
     def.scalar = SCALAR_LAST;
     def.low = -22;
     def.high = -20;
@@ -112,6 +152,30 @@ static void test_checks_scalar(void **state) {
     r = scalar("absent", SCALAR_MAX, 0, 1, 1);
     assert_false(r.pass);
     contains(r.note, "no column absent");
+}
+
+// an oscillation that falls as exp(-0.3 t) about 2
+static void test_checks_decay(void **state) {
+    (void)state;
+    FILE *to = fopen(place("history.csv"), "w");
+    fputs("step,time,fall,still\n", to);
+    for (int i = 0; i <= 4000; i++) {
+        double t = 0.0025 * i;
+        fprintf(to, "%d,%.17g,%.17g,2\n", i, t, 2 + 0.1 * exp(-0.3 * t) * cos(2 * M_PI * t / 1.1));
+    }
+    fclose(to);
+    near(scalar("fall", SCALAR_DECAY, 0, 10, 0.3).value, 0.3, 1e-4);
+    near(scalar("fall", SCALAR_DECAY, 1.3, 7.7, 0.3).value, 0.3, 1e-4);
+    silt_check_def def = check_of("scaled", "fall");
+    def.scalar = SCALAR_DECAY;
+    def.time_scale = 2;
+    def.scale = -7;
+    near(measure(&def).value, 0.15, 1e-4);
+    silt_check_result r = scalar("still", SCALAR_DECAY, 0, 10, 0);
+    assert_false(r.pass);
+    contains(r.note, "fewer than three half waves");
+    r = scalar("fall", SCALAR_DECAY, 0, 1, 0.3);
+    assert_false(r.pass);
 }
 
 static void test_checks_curve(void **state) {
@@ -189,6 +253,96 @@ static void test_checks_curve(void **state) {
     contains(r.note, "nowhere.csv");
 }
 
+// ---------------------------------------------------------------- keys
+
+// gauges and checks of every kind are read, written back and read to the same
+static void test_keys(void **state) {
+    (void)state;
+    silt_error err = {0};
+    silt_scene *scene = NULL, *again = NULL;
+    make("curve.csv", "t,x\n1,1\n2,4\n");
+    make("keys.yaml",
+         "silt: 1\n"
+         "time: {end: 10, output: 0.25}\n"
+         "gravity: [0, -9.81]\n"
+         "fluid: {density: 1000, viscosity: 0.001, size: 0.1, regions: [{box: [[0, 0], [1, 1]]}]}\n"
+         "walls: [{polyline: [[0, 2], [0, 0], [4, 0], [4, 2]]}]\n"
+         "gauges:\n"
+         "  - {name: wide, extent: x}\n"
+         "  - {name: push, force_on: 0}\n"
+         "  - {name: turn, angular_momentum_about: [0.5, 0.25]}\n"
+         "  - {name: middle, centroid_of: water}\n"
+         "checks:\n"
+         "  - {name: at, column: wide, scalar: at, at: 2, value: 1, tolerance: 0.1}\n"
+         "  - {name: arrives, column: push_x, scalar: reaches, level: 5, range: [0, 1]}\n"
+         "  - {name: period, gauge: turn, scalar: period, level: 0.5, range: [0, 1]}\n"
+         "  - {name: decay, column: middle_y, scalar: decay, value: 1, tolerance: 0.1}\n"
+         "  - {name: line, profile: velocity_x, at: 3, line: [[1, 0], [1, 2]], place_scale: 2, place_shift: -1,\n"
+         "     scale: 4, shift: 1, reference: curve.csv, tolerance: 0.1}\n"
+         "  - {name: surface, profile: surface, at: 0, reference: curve.csv, tolerance: 0.1}\n");
+    if (silt_scene_read(place("keys.yaml"), 0, NULL, &scene, &err))
+        fail_msg("%s", err.text);
+    const silt_gauge_def *g = scene->gauge;
+    const silt_check_def *c = scene->check;
+    assert_true(g[0].kind == GAUGE_EXTENT && g[0].from[0] == 0 && g[1].kind == GAUGE_FORCE && g[1].index == 0);
+    assert_true(g[2].kind == GAUGE_ANGULAR && g[2].from[1] == 0.25 && g[3].kind == GAUGE_CENTROID);
+    assert_int_equal(silt_gauges_count(scene), 1 + 3 + 1 + 3);
+    assert_true(c[0].kind == CHECK_COLUMN && c[0].scalar == SCALAR_AT && c[0].at == 2 && isnan(c[0].level));
+    assert_true(c[1].level == 5 && isnan(c[1].at) && c[2].level == 0.5);
+    assert_true(c[4].kind == CHECK_PROFILE && c[4].profile == PROFILE_VELOCITY_X && c[4].at == 3 && !c[4].column);
+    assert_true(c[4].line[0] == 1 && c[4].line[4] == 2 && c[4].place_scale == 2 && c[4].place_shift == -1);
+    assert_true(c[4].scale == 4 && c[4].shift == 1 && c[5].profile == PROFILE_SURFACE && c[5].place_scale == 1);
+    assert_string_equal(c[4].y, "x");
+    make("again.yaml", scene->resolved);
+    if (silt_scene_read(place("again.yaml"), 0, NULL, &again, &err))
+        fail_msg("%s", err.text);
+    assert_string_equal(again->resolved, scene->resolved);
+    assert_memory_equal(again->check[4].line, c[4].line, sizeof c[4].line);
+    assert_true(again->check[5].kind == CHECK_PROFILE && again->check[5].at == 0);
+    silt_scene_free(&scene);
+    silt_scene_free(&again);
+}
+
+// every file that a scene reads goes with it; files of one name, and names that a run needs, get a number
+static void test_copies(void **state) {
+    (void)state;
+    silt_error err = {0};
+    silt_scene *scene = NULL, *again = NULL;
+    mkdir(place("far"), 0777);
+    mkdir(place("far/below"), 0777);
+    mkdir(place("far.out"), 0777);
+    make("far/gate.csv", "time,y\n0,0\n1,2\n");
+    make("far/below/gate.csv", "x,y\n0,0\n1,0\n1,1\n0,1\n");
+    make("far/history.csv", "t,x\n1,1\n2,4\n");
+    make("far/scene.yaml",
+         "silt: 1\n"
+         "time: {end: 10, output: 0.25}\n"
+         "gravity: [0, -9.81]\n"
+         "fluid: {density: 1000, viscosity: 0.001, size: 0.1, regions: [{outline: below/gate.csv}]}\n"
+         "walls: [{polyline: [[0, 2], [0, 0], [4, 0], [4, 2]]}, {polyline: [[1, 0], [1, 2]], motion: gate.csv}]\n"
+         "checks:\n"
+         "  - {name: a, column: time, reference: history.csv, tolerance: 0.1}\n"
+         "  - {name: b, profile: surface, at: 1, reference: history.csv, tolerance: 0.1}\n");
+    if (silt_scene_read(place("far/scene.yaml"), 0, NULL, &scene, &err))
+        fail_msg("%s", err.text);
+    if (silt_verify_copy(scene, place("far.out"), &err))
+        fail_msg("%s", err.text);
+    char command[1400];
+    snprintf(command, sizeof command, "rm -r '%s'", place("far"));
+    assert_int_equal(system(command), 0);
+    if (silt_scene_read(place("far.out/scene.yaml"), 0, NULL, &again, &err))
+        fail_msg("%s", err.text);
+    assert_true(again->wall[1].motion.n_row == 2 && again->fluid.region[0].n_point == 4);
+    assert_string_equal(content("far.out/2_history.csv"), "t,x\n1,1\n2,4\n");
+    assert_true(exists("far.out/gate.csv") && exists("far.out/1_gate.csv") && !exists("far.out/history.csv"));
+    assert_string_equal(again->check[0].reference, again->check[1].reference);
+    // and again from there, onto themselves
+    assert_int_equal(silt_verify_copy(again, place("far.out"), &err), SILT_OK);
+    assert_string_equal(content("far.out/2_history.csv"), "t,x\n1,1\n2,4\n");
+    silt_scene_free(&scene);
+    silt_scene_free(&again);
+}
+
 // ---------------------------------------------------------------- verify, summary, info
 
 static void test_verify(void **state) {
@@ -252,9 +406,8 @@ static void test_verify(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_checks_scalar),
-        cmocka_unit_test(test_checks_curve),
-        cmocka_unit_test(test_verify),
+        cmocka_unit_test(test_checks_scalar), cmocka_unit_test(test_checks_decay), cmocka_unit_test(test_checks_curve),
+        cmocka_unit_test(test_keys),          cmocka_unit_test(test_copies),       cmocka_unit_test(test_verify),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

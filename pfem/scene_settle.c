@@ -1,0 +1,334 @@
+/** @file scene_settle.c
+ * What reading leaves open: the tables that the scene names, with the columns they must hold, and the defaults that
+ * hang on other keys.
+ */
+#include "scene_keys.h"
+
+#include <limits.h>
+
+// tables -----------------------------------------------------------------------------------------------
+// "x, y" or "x, y, z": names of columns, in one text
+static void settle_names(FILE *to, const char *const *name, int n) {
+    for (int i = 0; i < n; i++)
+        fprintf(to, "%s%s", i ? ", " : "", name[i]);
+}
+
+// A complaint when the table has a column of another name, lacks one of the first n_need, or has none of all; the first
+// column of a table over time may have any name.
+static bool settle_columns(silt_reader *reader, const silt_tree *node, const char *path, const silt_series *table,
+                           const char *const *name, int n_name, int n_need, bool over_time) {
+    const char *missing = NULL, *strange = NULL;
+    int n_found = 0;
+    for (int c = over_time ? 1 : 0; c < table->n_column; c++) {
+        bool known = false;
+        for (int i = 0; i < n_name; i++)
+            known |= strcmp(name[i], table->name[c]) == 0;
+        n_found += known;
+        strange = known || strange ? strange : table->name[c];
+    }
+    for (int i = n_need - 1; i >= 0; i--)
+        missing = silt_series_column(table, name[i]) < 0 ? name[i] : missing;
+    if (!missing && !strange && n_found > 0)
+        return true;
+    char *text = NULL;
+    size_t size = 0;
+    FILE *to = open_memstream(&text, &size);
+    if (!to)
+        return false;
+    if (missing)
+        fprintf(to, "no column '%s'", missing);
+    else if (strange)
+        fprintf(to, "the column '%.60s'", strange);
+    else
+        fprintf(to, "no column that counts");
+    fprintf(to, " in %s, allowed the columns %s", table->path, over_time ? "time and any of " : "");
+    settle_names(to, name, n_need ? n_need : n_name);
+    if (n_need && n_name > n_need) {
+        fprintf(to, ", with ");
+        settle_names(to, name + n_need, n_name - n_need);
+        fprintf(to, " if wanted");
+    }
+    fclose(to);
+    silt_complain(reader, node, "key '%s': found %s", path, text);
+    free(text);
+    return false;
+}
+
+// every cell of the columns that count must hold a number
+static bool settle_finite(silt_reader *reader, const silt_tree *node, const char *path, const silt_series *table) {
+    for (int i = 0; i < table->n_row; i++)
+        for (int c = 0; c < table->n_column; c++)
+            if (!isfinite(table->value[(size_t)i * (size_t)table->n_column + (size_t)c])) {
+                silt_complain(reader, node,
+                              "key '%s': found no finite number in column '%s' at %s:%d, allowed one in each cell",
+                              path, table->name[c], table->path, table->line[i]);
+                return false;
+            }
+    return true;
+}
+
+// puts the columns in the order of the names, zeros for those that are not there; column 0 stays when it is time
+static void settle_order(silt_series *table, const char *const *name, int n_name, bool over_time) {
+    const int first = over_time ? 1 : 0, n = first + n_name;
+    double *value = silt_alloc((size_t)table->n_row, (size_t)n * sizeof *value);
+    char **names = silt_alloc((size_t)n, sizeof *names);
+    for (int k = 0; k < n; k++) {
+        const int c = k < first ? 0 : silt_series_column(table, name[k - first]);
+        names[k] = silt_text("%s", k < first ? table->name[0] : name[k - first]);
+        for (int i = 0; i < table->n_row && c >= 0; i++)
+            value[(size_t)i * (size_t)n + (size_t)k] = table->value[(size_t)i * (size_t)table->n_column + (size_t)c];
+    }
+    for (int c = 0; c < table->n_column; c++)
+        free(table->name[c]);
+    free(table->name);
+    free(table->value);
+    table->name = names;
+    table->value = value;
+    table->n_column = n;
+}
+
+// a file of points, read; false after a complaint
+static bool settle_read(silt_reader *reader, const silt_tree *node, const char *path, const char *file,
+                        silt_series *table) {
+    silt_error err = {0};
+    if (silt_series_read(NULL, file, table, &err) == SILT_OK)
+        return true;
+    silt_complain(reader, node, "key '%s': found a file that cannot serve, allowed a CSV table: %s", path, err.text);
+    return false;
+}
+
+// regions ----------------------------------------------------------------------------------------------
+// the corners of an outline's file
+static void settle_outline(silt_reader *reader, const silt_scene *scene, silt_region *region, const char *path) {
+    static const char *const column[2][2] = {{"x", "y"}, {"x", "z"}};
+    const silt_tree *item = silt_tree_find(reader->root, "%s.outline", path);
+    if (!region->outline || region->n_point || !item)
+        return;
+    char *key = silt_text("%s.outline", path);
+    const char *const *name = column[scene->dimension == 3];
+    silt_series table = {0};
+    if (settle_read(reader, item, key, region->outline, &table) &&
+        settle_columns(reader, item, key, &table, name, 2, 2, false) && settle_finite(reader, item, key, &table)) {
+        if (table.n_row < 3 || table.n_row > SCENE_CORNERS) {
+            silt_complain(reader, item, "key '%s': found %d corners in %s, allowed 3 to %d", key, table.n_row,
+                          table.path, SCENE_CORNERS);
+        } else {
+            double *point = silt_alloc((size_t)table.n_row, 3 * sizeof *point);
+            for (int k = 0; k < 2; k++) {
+                const int c = silt_series_column(&table, name[k]);
+                for (int i = 0; i < table.n_row; i++)
+                    point[3 * i + k] = table.value[(size_t)i * 2 + (size_t)c];
+            }
+            if (silt_polygon_sound(reader, item, NULL, key, table.n_row, point)) {
+                region->point = point;
+                region->n_point = table.n_row;
+            } else {
+                free(point);
+            }
+        }
+    }
+    silt_series_clear(&table);
+    free(key);
+}
+
+static void settle_regions(silt_reader *reader, silt_scene *scene) {
+    silt_region *const list[3] = {scene->fluid.region, scene->bed.region, NULL};
+    const int count[3] = {scene->fluid.n_region, scene->bed.n_region, scene->fluid.n_size};
+    static const char *const name[3] = {"fluid.regions", "bed.regions", "fluid.sizes"};
+    for (int l = 0; l < 3; l++)
+        for (int i = 0; i < count[l]; i++) {
+            char *path = silt_text("%s.%d", name[l], i);
+            settle_outline(reader, scene, list[l] ? &list[l][i] : &scene->fluid.size_at[i].region, path);
+            free(path);
+        }
+}
+
+// walls ------------------------------------------------------------------------------------------------
+static void settle_wall(silt_reader *reader, const silt_scene *scene, silt_wall *wall, int i) {
+    static const char *const motion[4] = {"x", "y", "angle", "z"}; // z is last: not in 2-D
+    const silt_tree *node = silt_tree_find(reader->root, "walls.%d", i);
+    char *path = silt_text("walls.%d.motion", i);
+    if (wall->form == WALL_BOX && scene->dimension != 3 && wall->lo[0] < wall->hi[0]) {
+        // its four corners, counter-clockwise
+        const double *lo = wall->lo, *hi = wall->hi;
+        const double corner[12] = {lo[0], lo[1], 0, hi[0], lo[1], 0, hi[0], hi[1], 0, lo[0], hi[1], 0};
+        free(wall->point);
+        wall->point = silt_alloc(12, sizeof(double));
+        memcpy(wall->point, corner, sizeof corner);
+        wall->n_point = 4;
+        wall->closed = true;
+        wall->form = WALL_POLYLINE;
+    }
+    for (int k = 0; k < 3 && wall->form != WALL_BOX; k++) {
+        wall->lo[k] = 0;
+        wall->hi[k] = -1;
+    }
+    if (wall->surface) {
+        const silt_tree *item = silt_tree_item(node, "surface");
+        const char *end = strrchr(wall->surface, '.');
+        FILE *file = fopen(wall->surface, "rb");
+        if (!end || (strcasecmp(end, ".stl") != 0 && strcasecmp(end, ".msh") != 0))
+            silt_complain(reader, item,
+                          "key 'walls.%d.surface': found the file '%s', allowed one whose name ends in .stl or .msh", i,
+                          wall->surface);
+        else if (!file)
+            silt_complain(reader, item,
+                          "key 'walls.%d.surface': found no file %s that can be opened, allowed an STL or .msh file", i,
+                          wall->surface);
+        if (file)
+            fclose(file);
+    }
+    if (wall->motion.n_row)
+        settle_columns(reader, silt_tree_item(node, "motion"), path, &wall->motion, motion,
+                       scene->dimension == 3 ? 4 : 3, 0, true);
+    if (wall->condition == WALL_DEFAULT)
+        wall->condition = scene->fluid.on && scene->fluid.flow == FLOW_TURBULENT ? WALL_LAW : WALL_NO_SLIP;
+    free(path);
+}
+
+// formulas ---------------------------------------------------------------------------------------------
+static void settle_formula(silt_reader *reader, const silt_scene *scene, silt_formula *formula, const char *path) {
+    static const char *const point[2][6] = {{"x", "y", "vx", "vy"}, {"x", "y", "z", "vx", "vy", "vz"}};
+    static const char *const vector[3] = {"x", "y", "z"};
+    const silt_tree *node = silt_tree_find(reader->root, "%s", path), *file = silt_tree_item(node, "file");
+    const int dim = scene->dimension == 3 ? 3 : 2;
+    char *key = silt_text("%s.file", path);
+    silt_series *table = &formula->series;
+    silt_error err = {0};
+    formula->dimension = dim;
+    if (formula->kind == FORMULA_UNIFORM && !silt_tree_item(node, "vector"))
+        silt_complain_key(reader, node, "key '%s.vector': found nothing in this block, allowed %s", path,
+                          dim == 3 ? "[x, y, z]" : "[x, y]");
+    if (formula->kind == FORMULA_SOLITARY_WAVE && formula->depth > 0 && silt_tree_item(node, "amplitude")) {
+        if (formula->amplitude > 0 && formula->amplitude <= 0.4 * formula->depth)
+            silt_formula_prepare(formula);
+        else
+            silt_complain(reader, silt_tree_item(node, "amplitude"),
+                          "key '%s.amplitude': found %.10g, allowed > 0 and <= 0.4 of the depth", path,
+                          formula->amplitude);
+    }
+    if (formula->kind == FORMULA_FIELD && table->n_row) {
+        const char *const *name = point[dim == 3];
+        if (settle_columns(reader, file, key, table, name, 2 * dim, 2 * dim, false) &&
+            settle_finite(reader, file, key, table)) {
+            settle_order(table, name, 2 * dim, false);
+            const int twice = silt_formula_prepare(formula);
+            if (twice >= 0)
+                silt_complain(reader, file, "key '%s': found a point again at %s:%d, allowed each point once", key,
+                              table->path, table->line[twice]);
+        }
+    } else if (formula->kind == FORMULA_SERIES && table->n_row) {
+        if (silt_series_rising(table, &err) != SILT_OK)
+            silt_complain(reader, file,
+                          "key '%s': found a file that cannot serve, allowed a CSV table over rising time: %s", key,
+                          err.text);
+        else if (settle_columns(reader, file, key, table, vector, dim, 0, true))
+            settle_order(table, vector, dim, true);
+    }
+    free(key);
+}
+
+// water ------------------------------------------------------------------------------------------------
+// the node cloud: coordinates, and all of the velocity or nothing of it
+static void settle_cloud(silt_reader *reader, const silt_scene *scene) {
+    static const char *const name[2][6] = {{"x", "y", "vx", "vy"}, {"x", "y", "z", "vx", "vy", "vz"}};
+    const silt_fluid_def *fluid = &scene->fluid;
+    const silt_tree *node = silt_tree_find(reader->root, "fluid.cloud");
+    const int dim = scene->dimension == 3 ? 3 : 2;
+    silt_series table = {0};
+    if (!fluid->cloud || !node)
+        return;
+    if (settle_read(reader, node, "fluid.cloud", fluid->cloud, &table)) {
+        const bool moves = silt_series_column(&table, "vx") >= 0;
+        if (settle_columns(reader, node, "fluid.cloud", &table, name[dim == 3], 2 * dim, moves ? 2 * dim : dim,
+                           false) &&
+            settle_finite(reader, node, "fluid.cloud", &table) && table.n_row <= dim)
+            silt_complain(reader, node, "key 'fluid.cloud': found %d nodes in %s, allowed %d or more", table.n_row,
+                          table.path, dim + 1);
+    }
+    silt_series_clear(&table);
+    if (!silt_tree_find(reader->root, "fluid.regions"))
+        silt_complain(
+            reader, node,
+            "key 'fluid.cloud': found it without regions, allowed with fluid.regions, which say where between "
+            "the nodes water is");
+    if (fluid->jitter > 0)
+        silt_complain(
+            reader, silt_tree_find(reader->root, "fluid.jitter"),
+            "key 'fluid.jitter': found it beside a cloud, allowed without: the cloud's nodes stand where they "
+            "are");
+}
+
+static void settle_sizes(silt_reader *reader, const silt_scene *scene) {
+    static const char *const form[] = {"box", "polygon", "outline", "circle", "sphere"};
+    for (int i = 0; i < scene->fluid.n_size; i++) {
+        const silt_size_def *size = &scene->fluid.size_at[i];
+        const silt_tree *node = silt_tree_find(reader->root, "fluid.sizes.%d", i), *near = silt_tree_item(node, "near");
+        const silt_tree *given = NULL;
+        for (int k = 0; k < 5 && !given; k++)
+            given = silt_tree_item(node, form[k]);
+        const char *lacks = size->near == NEAR_WALLS && scene->n_wall == 0    ? "walls"
+                            : size->near == NEAR_BED && !scene->bed.on        ? "bed"
+                            : size->near == NEAR_BODIES && scene->n_body == 0 ? "bodies"
+                                                                              : NULL;
+        if (!node || node->kind != TREE_MAPPING)
+            continue;
+        if (size->near == NEAR_REGION && !given)
+            silt_complain(
+                reader, node,
+                "key 'fluid.sizes.%d': found none of its forms, allowed near: walls, bed, bodies or surface, or "
+                "one of: %s, polygon, outline, %s",
+                i, "box", scene->dimension == 3 ? "sphere" : "circle");
+        else if (size->near && size->near != NEAR_REGION && given)
+            silt_complain_key(reader, given,
+                              "key 'fluid.sizes.%d.%s': found it beside near: %s, allowed with near: region", i,
+                              given->key, near && near->text ? near->text : "?");
+        else if (lacks)
+            silt_complain(reader, near, "key 'fluid.sizes.%d.near': found '%s', allowed in a scene that has %s", i,
+                          lacks, lacks);
+    }
+}
+
+static void settle_fluid(silt_reader *reader, silt_scene *scene) {
+    silt_fluid_def *fluid = &scene->fluid;
+    const silt_tree *node = silt_tree_item(reader->root, "fluid");
+    const bool laminar = fluid->flow == FLOW_LAMINAR;
+    if (!fluid->on)
+        return;
+    // turbulence
+    if (laminar && fluid->turbulence != TURBULENCE_AUTO && fluid->turbulence != TURBULENCE_NONE)
+        silt_complain(
+            reader, silt_tree_item(node, "turbulence"),
+            "key 'fluid.turbulence': found a model in laminar flow, allowed auto or none, or flow: turbulent");
+    if (fluid->turbulence == TURBULENCE_AUTO)
+        fluid->turbulence = laminar                 ? TURBULENCE_NONE
+                            : scene->dimension == 3 ? TURBULENCE_WALE
+                                                    : TURBULENCE_MIXING_LENGTH;
+    // rheology
+    if (fluid->rheology == RHEOLOGY_NEWTONIAN && fluid->yield_stress > 0)
+        silt_complain(reader, silt_tree_item(node, "yield_stress"),
+                      "key 'fluid.yield_stress': found %.10g in a Newtonian fluid, allowed 0, or rheology: bingham or "
+                      "herschel-bulkley",
+                      fluid->yield_stress);
+    if (fluid->rheology != RHEOLOGY_HERSCHEL_BULKLEY && fluid->flow_index > 0 && fluid->flow_index != 1)
+        silt_complain(reader, silt_tree_item(node, "flow_index"),
+                      "key 'fluid.flow_index': found %.10g, allowed 1, or rheology: herschel-bulkley",
+                      fluid->flow_index);
+    // time
+    if (fluid->theta > 0 && fluid->theta < 0.5)
+        silt_complain(reader, silt_tree_item(node, "theta"),
+                      "key 'fluid.theta': found %.10g, allowed 0.5 to 1, or 0: what fluid.order says", fluid->theta);
+    if (fluid->theta == 0)
+        fluid->theta = fluid->order == 1 ? 1 : 0.5;
+    settle_cloud(reader, scene);
+    settle_sizes(reader, scene);
+    settle_formula(reader, scene, &fluid->velocity, "fluid.velocity");
+    settle_formula(reader, scene, &fluid->force, "fluid.body_force");
+}
+
+void silt_scene_settle(silt_reader *reader, silt_scene *scene) {
+    settle_regions(reader, scene);
+    for (int i = 0; i < scene->n_wall; i++)
+        settle_wall(reader, scene, &scene->wall[i], i);
+    settle_fluid(reader, scene);
+}

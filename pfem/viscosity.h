@@ -1,0 +1,140 @@
+/** @file viscosity.h
+ * How water and mud resist being sheared: depth and distance to walls, eddy viscosity (turbulence.c), apparent viscosity of
+ * yield-stress fluids (rheology.c), traction of walls whose boundary layer is thinner than a cell (wall_law.c).
+ * Everything works in two and three dimensions: positions and velocities have `dim` numbers a node, velocity gradients
+ * dim * dim numbers, row d holding dv_d/dx_k.
+ *
+ * In a step of the water:
+ *   once    silt_depth_update, silt_wall_law_place
+ *   in iterations, with the present iterate w: the first two for water (later ones only unsettle the pressure), every one where
+ *   viscosity is stiff or changes much in a step
+ *           silt_viscosity_update (blend 1 in the first, 0.5 after), silt_wall_law_traction
+ *           momentum gets  - friction_i w_i + force_i  at wall nodes, friction_i joins the node's inertia
+ */
+#ifndef SILT_VISCOSITY_H
+#define SILT_VISCOSITY_H
+
+#include "pfem.h"
+
+#define SILT_KAPPA 0.41 // von Karman's constant
+
+// ---------------------------------------------------------------- turbulence.c
+
+/** distances of the water's nodes, found along the mesh; arrays grow only, valid when zeroed */
+typedef struct silt_depth {
+    int n_node, n_facet, node_capacity, facet_capacity, start_capacity, item_capacity;
+    double *wall;         // owned, one per node, m, to the nearest facet that brakes the water; HUGE_VAL: none, or dry
+    double *surface;      // owned, one per node, m, to the nearest free facet; HUGE_VAL: none, or dry
+    int *wall_facet;      // owned, one per node, that facet of the mesh, -1
+    int *surface_facet;   // owned, one per node
+    uint8_t *brakes;      // owned, one per facet: 0 slip, free or inlet; 1 water sticks to it; 2 law of the wall
+    double enclosed;      // m, largest distance to walls where no free surface is: what stands for the depth there
+    int *queue;           // owned, working space
+    uint8_t *queued;      // owned, working space
+    int *start, *item;    // owned, facets of a node
+} silt_depth;
+
+/** Distances to walls (WALL, BED and BODY facets without slip) and to the free surface at positions x, across periodic borders
+ * too; exact for the facet found. Costs a sweep over the nodes; call once a step.
+ * @param x  dim per node, m */
+void silt_depth_update(silt_depth *depth, const silt_scene *scene, const silt_walls *walls, const silt_nodes *nodes,
+                       const silt_mesh *mesh, const double *x);
+void silt_depth_clear(silt_depth *depth);
+
+/** m, distance of a point to a facet of `dim` corners (segment, triangle), dim numbers each */
+double silt_facet_distance(int dim, const double *point, const double *corner);
+/** Mixing length kappa d sqrt(1 - d/D), D = d + s, m: gives the logarithmic profile in a uniform open channel (Nezu & Rodi 1986).
+ * @param d  m, distance to the wall; @param s  m, distance to the surface; infinite d: 0 (a jet knows no wall) */
+double silt_mixing_length(double d, double s);
+
+/** |S| = sqrt(2 S:S), 1/s, of the symmetric part of a velocity gradient */
+double silt_shear_rate(int dim, const double *gradient);
+/** Smagorinsky's model, m2/s: (min(0.17 delta, kappa d))^2 |S|. @param delta  m, size of the cell, V^(1/dim) */
+double silt_eddy_smagorinsky(double delta, double d, double rate);
+/** WALE of Nicoud & Ducros (1999), eq. 13, m2/s, C_w = 0.5: nought in pure shear and pure strain of a plane flow, 0.904 (C_w delta)^2
+ * times the rate in solid rotation (where it does no work) */
+double silt_eddy_wale(int dim, double delta, const double *gradient);
+
+/** the model that a scene means: never TURBULENCE_AUTO */
+silt_turbulence silt_turbulence_model(const silt_scene *scene);
+
+/** what the viscosities of a step look like, for the report */
+typedef struct silt_viscosity_report {
+    double eddy_mean, eddy_max; // Pa s, over cells (mean by volume)
+    double rate_max;            // 1/s
+} silt_viscosity_report;
+
+/** True when a scene's viscosity is not the same everywhere: otherwise the arrays below are not needed. */
+bool silt_viscosity_varies(const silt_scene *scene);
+/** Viscosity of every cell: molecular or apparent (rheology) plus eddy viscosity.
+ * Where the model is Smagorinsky or WALE, cells below the height at which the law of the wall looks at the water get at least
+ * the mixing length's viscosity: nothing else there could carry the wall's traction into the water.
+ * @param flux    (dim + 1) * dim per cell, node by node: its volume times the gradients of the shape functions
+ * @param inverse one per cell, 1/volume
+ * @param v       dim per node, m/s
+ * @param blend   share of the new value, the rest is what mu holds: 1 at first, 0.5 in iterations (Newton's square root: a stress
+ *                quadratic in the rate, taken with the old rate times the new, would jump to and fro for ever)
+ * @param mu      out, one per cell, Pa s
+ * @param report  out, may be NULL */
+void silt_viscosity_update(const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh, const silt_depth *depth,
+                           const double *flux, const double *inverse, const double *v, double blend, double *mu,
+                           silt_viscosity_report *report);
+
+// ---------------------------------------------------------------- rheology.c
+
+/** Apparent viscosity, Pa s, of Newtonian, Bingham and Herschel-Bulkley fluids at a shear rate (sqrt(2 S:S), 1/s):
+ * (yield_stress + viscosity r^n)/r with r = rate/(1 - exp(-rate/plastic_rate)), which is Papanastasiou's (1987) for Bingham.
+ * Above some plastic_rates it is the law itself; at rest a viscosity of (yield_stress + viscosity plastic_rate^n)/plastic_rate.
+ * plastic_rate must be positive for fluids that are not Newtonian. */
+double silt_apparent_viscosity(const silt_fluid_def *fluid, double rate);
+
+// ---------------------------------------------------------------- wall_law.c
+
+/** How a facet meets the water. @param roughness  out, m, k_s of the law of the wall, else 0.
+ * @return the condition; -1: no wall (free surface, inlet) */
+int silt_facet_condition(const silt_scene *scene, const silt_walls *walls, const silt_nodes *nodes, const silt_mesh *mesh,
+                         int facet, double *roughness);
+
+/** times h: the height above walls at which their law looks at the water */
+double silt_wall_height(const silt_fluid_def *fluid);
+/** Stress of a wall, Pa, from the speed along it at a height: u/u* = y+ on a smooth wall, ln(9.8 y+)/kappa in its log layer,
+ * ln(30 y/k_s)/kappa on a rough one; whichever resists more. Rises with speed, without jumps.
+ * @param roughness  m, k_s, 0 smooth; @param slope  out, Pa s/m, derivative by the speed, positive; may be NULL */
+double silt_wall_stress(double rho, double nu, double speed, double height, double roughness, double *slope);
+
+/** a node on a wall with the law of the wall, and the place in the water that its traction is taken from */
+typedef struct silt_wall_point {
+    int node;
+    int element;         // of the walls, -1: bed
+    int sample[4];       // nodes that hold the velocity there, -1
+    double weight[4];    // their shares
+    double normal[3];    // unit, into the water
+    double area;         // m or m2 of wall that the node stands for; 0: no water to sample
+    double height;       // m, of the sample above the wall: less than asked where the water is thinner
+    double roughness;    // m, k_s
+    double velocity[3];  // m/s, of the wall
+    double shear[3];     // Pa, of the last traction: stress of the water on the wall
+} silt_wall_point;
+
+/** the nodes under the law of the wall; valid when zeroed */
+typedef struct silt_wall_law {
+    int n_point, point_capacity, entry_capacity;
+    silt_wall_point *point; // owned, rising by node
+    int *entry;             // owned, working space: point of a node
+    double y_plus[3];       // lowest, mean (by area), highest y+ of the samples at the last traction; 0: no point
+} silt_wall_law;
+
+/** Finds the wall nodes and where to look at the water: max(wall_height h, 2 k_s) along the wall's normal (mean of its facets at
+ * the node). Call after every rebuild and once a step; x: positions, dim per node. */
+void silt_wall_law_place(silt_wall_law *law, const silt_scene *scene, const silt_walls *walls, const silt_nodes *nodes,
+                         const silt_mesh *mesh, const double *x);
+/** Traction for the iterate v: the wall's force on the water at node i is force_i - friction_i w_i with the next iterate w. It is
+ * the stress of the sampled velocity, plus its slope times the change of the node's own velocity: once the iterates stand
+ * still (or the flow is steady) the sampled stress alone. Only the law's nodes are written; the caller zeroes the arrays.
+ * @param v         dim per node, m/s
+ * @param friction  out, one per node, kg/s, positive; @param force  out, dim per node, N */
+void silt_wall_law_traction(silt_wall_law *law, const silt_scene *scene, int dim, const double *v, double *friction,
+                            double *force);
+void silt_wall_law_clear(silt_wall_law *law);
+
+#endif
