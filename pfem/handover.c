@@ -1,6 +1,7 @@
 // a rebuild changes the nodes' share of the water: the momentum of what changes hands goes with it
 #include "pfem.h"
 
+#define HAND_ROOM 1.5 // times the largest velocity relative to the group's mean
 #define HAND_ROUNDS 6 // passes over a group in which some drop out because they are at the end of their range
 
 // Every group of a rebuild (book.c) is settled on its own. A node takes part with its share of the group's cells and an equal
@@ -71,7 +72,8 @@ static bool solve_small(int n, double a[3][3], double b[3]) {
     return true;
 }
 
-// radius of the ball about the group's mean that a part's velocity may not leave: the farthest of the group and of its neighbours
+// radius of the ball about the group's mean that a part's velocity may not leave: a little beyond the farthest of the group and of
+// its neighbours, or groups at walls have nowhere to put what is missing
 static double part_range(const ledger *l, const part *p, double group) {
     double square = silt_max(silt_square(group), silt_dot(l->dim, p->at, p->at));
     for (int k = l->mesh->neighbour_start[p->now]; k < l->mesh->neighbour_start[p->now + 1]; k++) {
@@ -81,7 +83,7 @@ static double part_range(const ledger *l, const part *p, double group) {
             sum += silt_square(v[d] - l->frame[d]);
         square = silt_max(square, sum);
     }
-    return sqrt(square);
+    return HAND_ROOM * sqrt(square);
 }
 
 // how much of a step a part may take
@@ -313,7 +315,7 @@ void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, sil
         if (l.mass[i] > 0 && nodes->kind[i] == NODE_FLUID) {
             for (int d = 0; d < dim; d++)
                 way[d] = p[d] / l.mass[i] - centre[dim * i + d];
-            const double length = silt_length(dim, way), share = length > radius[i] ? radius[i] / length : 1;
+            const double length = silt_length(dim, way), most = HAND_ROOM * radius[i], share = length > most ? most / length : 1;
             for (int d = 0; d < dim; d++)
                 at[d] = centre[dim * i + d] + share * way[d];
         }
