@@ -167,6 +167,26 @@ static void ledger_balance(silt_run *run) {
 
 // ---------------------------------------------------------------- steps in time
 
+// time in which a wall that moves passes a cell of the water on it: a gate also that slides along the water
+static double walls_time(const silt_run *run) {
+    const silt_nodes *nodes = &run->nodes;
+    const silt_walls *walls = &run->walls;
+    const int D = silt_nodes_dim(nodes);
+    double least = HUGE_VAL;
+    for (int i = 0; i < nodes->count; i++)
+        for (int k = 0; k < 3 && nodes->wall[i][k] >= 0; k++) {
+            const silt_wall_motion *m = &walls->motion[walls->wall[nodes->wall[i][k]]];
+            const int up = D == 3 ? 2 : 1;
+            double v[3] = {m->velocity[0], m->velocity[1], m->velocity[2]};
+            v[0] -= m->spin * (nodes->x[D * i + up] - m->centre[up]);
+            v[up] += m->spin * (nodes->x[D * i] - m->centre[0]);
+            const double speed = silt_length(3, v);
+            if (speed > 0)
+                least = silt_min(least, silt_node_h(nodes, i, run->scene->fluid.size) / speed);
+        }
+    return least;
+}
+
 // largest step that accuracy allows: courant number, cells that do not turn over, gravity, growth
 static double step_wanted(const silt_run *run) {
     const silt_scene *scene = run->scene;
@@ -190,6 +210,7 @@ static double step_wanted(const silt_run *run) {
         if (g > 0)
             least = silt_min(least, sqrt(h / g));
     }
+    least = silt_min(least, walls_time(run));
     dt = silt_min(dt, scene->time.cfl * least);
     // it grows by half at most, and with grains by one of their steps at least
     if (run->dt > 0) {
