@@ -8,11 +8,14 @@
 #define REFINE_SURFACE 0.35 // this: the surface's shape hangs on them; up to the former where the surface is so flat that
 #define REFINE_SHAPE 0.01   // less than this times h^dim comes or goes with the node
 #define REFINE_FLAT 0.25    // a node nearer to a wall than this times h is pressed out
-#define REFINE_LONG 1.5     // edges longer than this times h get nodes
 #define REFINE_ROOM 0.6     // but none nearer than this times h to another; on the boundary
 #define REFINE_RIM 0.36     // this: an edge of the surface that is not split tears; what is less dear than its node leaves
 #define REFINE_MEET 0.15
 #define REFINE_PIECES 4     // into which an edge is split at most
+// Edges longer than this times h get nodes, those of the surface and those inside: with less the cloud grows denser than h in
+// strong strain, and the diagonals of a lattice's faces in space would be split. Creases at 1.5.
+static const double refine_taut[4] = {0, 0, 1.5, 1.7}, refine_slack[4] = {0, 0, 1.6, 1.7};
+#define REFINE_CREASE 1.5
 // cells at the surface that are smaller than this times h^dim are films
 static const double refine_film[4] = {0, 0, 0.25, 0.068};
 
@@ -464,24 +467,26 @@ static bool refine_crease(const refinement *r, int a, int b) {
 
 // Edges that are too long: each cell's longest; in space also each boundary facet's longest and those along creases, which
 // the diagonals of cells and facets would always outrun.
-static void refine_long(refinement *r) {
-    int edge[2];
+static void refine_propose_long(refinement *r) {
+    const uint8_t *surface = r->mesh->surface;
+    int edge[2] = {0, 0};
     r->n = 0;
     for (int e = 0; e < r->mesh->n_cell; e++) {
         const double most = refine_longest(r, r->dim + 1, r->mesh->cell[e], edge);
-        if (most >= REFINE_LONG)
+        if (most >= (surface[edge[0]] && surface[edge[1]] ? refine_taut[r->dim] : refine_slack[r->dim]))
             refine_propose(r, most, edge[0], edge[1], -1);
     }
     for (int k = 0; k < r->mesh->n_facet && r->dim == 3; k++) {
         const int *facet = r->mesh->facet[k];
         const double most = refine_longest(r, 3, facet, edge);
-        if (most < REFINE_LONG)
+        if (most < REFINE_CREASE)
             continue;
-        refine_propose(r, most, edge[0], edge[1], -1);
+        if (most >= refine_taut[3])
+            refine_propose(r, most, edge[0], edge[1], -1);
         for (int a = 0; a < 3; a++) {
             const int pair[2] = {facet[a], facet[(a + 1) % 3]};
             const double ratio = refine_longest(r, 2, pair, edge);
-            if (ratio >= REFINE_LONG && ratio < most && refine_crease(r, pair[0], pair[1]))
+            if (ratio >= REFINE_CREASE && (ratio < most || most < refine_taut[3]) && refine_crease(r, pair[0], pair[1]))
                 refine_propose(r, ratio, edge[0], edge[1], -1);
         }
     }
@@ -504,7 +509,7 @@ static bool refine_is_film(const refinement *r, const int *cell, double h) {
 static void refine_stretched(refinement *r) {
     const silt_nodes *nodes = r->nodes;
     const int dim = r->dim;
-    refine_long(r);
+    refine_propose_long(r);
     r->fresh = silt_alloc((size_t)r->mesh->n_node + 1, sizeof *r->fresh);
     for (int i = 0; i < r->mesh->n_node; i++)
         r->fresh[i] = -1;
