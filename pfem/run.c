@@ -188,6 +188,12 @@ static double step_wanted(const silt_run *run) {
         if (g > 0)
             least = silt_min(least, sqrt(h / g));
     }
+    // water at rest meets a belt or a lid
+    for (int k = 0; k < scene->n_wall; k++) {
+        const double speed = silt_length(3, scene->wall[k].velocity);
+        if (speed > 0)
+            least = silt_min(least, scene->fluid.size / speed);
+    }
     dt = silt_min(dt, scene->time.cfl * least);
     // it grows by half at most, and with grains by one of their steps at least
     if (run->dt > 0) {
