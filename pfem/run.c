@@ -280,6 +280,7 @@ static void water_restore(silt_run *run) {
     memcpy(run->nodes.v, run->v_old, (size_t)silt_nodes_dim(&run->nodes) * n * sizeof(double));
     memcpy(run->nodes.debt, run->debt_old, n * sizeof(double));
     silt_pressure_forget(run->fluid.pressure);
+    silt_stiff_forget(run->fluid.stiff);
 }
 
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
@@ -467,6 +468,8 @@ static silt_status step_output(silt_run *run, silt_error *err) {
         run->summary.phase[k] += run->phase[k];
     run->summary.node_steps += run->nodes.count;
     run->summary.iterations += run->fluid.iterations;
+    if (run->fluid.iterations > run->summary.most_iterations)
+        run->summary.most_iterations = run->fluid.iterations;
     run->summary.steps++;
     run->output_seconds = silt_seconds() - since;
     run->whole = true;
