@@ -341,6 +341,13 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
     }
     f->momentum_residual = sqrt(square);
 
+    // the law of the wall brakes what is free
+    for (int k = 0; k < f->law.n_point; k++) {
+        const int i = f->law.point[k].node;
+        for (int d = 0; d < D && s->mesh->wet[i]; d++)
+            out[D * i + d] += f->wall_force[D * i + d] - f->friction[i] * f->w[D * i + d];
+    }
+
     // viscous dissipation w . K w
     memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
     silt_assemble_viscous(f, s->mesh, f->w, 1, f->scratch);
