@@ -66,7 +66,7 @@ static inline __attribute__((always_inline)) double bounded_inverse(const int D,
 
 KERNEL geometry(const int D, silt_fluid *f, const silt_step *s, double dt) {
     const silt_mesh *mesh = s->mesh;
-    const double rho = s->scene->fluid.density, theta_dt = s->scene->fluid.theta * s->dt;
+    const double rho = s->scene->fluid.density, theta_dt = f->theta * s->dt;
     const double *solid = s->drag ? s->drag->solid : NULL, *x = s->nodes->x;
     double *end = f->scratch;
     for (int k = 0; k < D * f->n_node; k++) {

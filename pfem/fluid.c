@@ -2,6 +2,7 @@
 #include "fluid.h"
 
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
+#define FLUID_DAMPED 2.0    // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 
@@ -15,6 +16,7 @@ void silt_fluid_clear(silt_fluid *f) {
     free(f->hold);
     free(f->mobile);
     silt_pressure_free(&f->pressure);
+    silt_stiff_free(&f->stiff);
     silt_mix_free(&f->mix);
     silt_wall_normals_clear(&f->wall_normals);
     silt_depth_clear(&f->depth);
@@ -92,7 +94,7 @@ static double stiffness(const silt_fluid *f, const silt_step *s) {
     double mu = 0;
     for (int e = 0; e < f->n_cell; e++)
         mu = silt_max(mu, f->mu[e]);
-    return mu * s->scene->fluid.theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
+    return mu * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
 }
 
 // acceleration besides gravity, half way through the step
@@ -106,7 +108,7 @@ static void body_force(const silt_fluid *f, const silt_step *s, int i, double a[
 // with grains, whose drag may be stiff, the masses stay lumped.
 static void find_excess(silt_fluid *f, const silt_step *s, const double *right) {
     const int D = f->dim;
-    const double theta_dt = s->scene->fluid.theta * s->dt, stiff = stiffness(f, s), *v = s->nodes->v;
+    const double theta_dt = f->theta * s->dt, stiff = stiffness(f, s), *v = s->nodes->v;
     double *a = f->cg[0];
     memset(f->excess, 0, (size_t)(D * f->n_node) * sizeof(double));
     if (s->drag)
@@ -136,7 +138,7 @@ static void find_excess(silt_fluid *f, const silt_step *s, const double *right) 
 // force on the nodes but for inertia, viscosity and drag's own share: M v/(theta dt) + M g + push + G p
 static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, double *out) {
     const int D = f->dim;
-    const double theta_dt = s->scene->fluid.theta * s->dt, *v = s->nodes->v, *g = s->scene->gravity;
+    const double theta_dt = f->theta * s->dt, *v = s->nodes->v, *g = s->scene->gravity;
     for (int i = 0; i < f->n_node; i++)
         for (int d = 0; d < D; d++)
             out[D * i + d] = f->mass[i] * (v[D * i + d] / theta_dt + g[d]) + (s->drag ? s->drag->push[D * i + d] : 0);
@@ -350,6 +352,13 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
     }
     f->momentum_residual = sqrt(square);
 
+    // the law of the wall brakes what is free
+    for (int k = 0; k < f->law.n_point; k++) {
+        const int i = f->law.point[k].node;
+        for (int d = 0; d < D && s->mesh->wet[i]; d++)
+            out[D * i + d] += f->wall_force[D * i + d] - f->friction[i] * f->w[D * i + d];
+    }
+
     // viscous dissipation w . K w
     memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
     silt_assemble_viscous(f, s->mesh, f->w, 1, f->scratch);
@@ -382,6 +391,36 @@ static silt_status astray_node(const silt_fluid *f, const silt_step *s, silt_err
     return SILT_OK;
 }
 
+// The trapezoidal rule turns the sign of modes that viscosity brings to rest within the step and hardly damps them: where
+// N = mu dt/(rho h^2) is large the step goes over to backward Euler, whose error such modes do not feel.
+static bool choose_theta(silt_fluid *f, const silt_step *s) {
+    double mu = 0;
+    for (int e = 0; e < f->n_cell && s->scene->fluid.flow == FLOW_LAMINAR; e++)
+        mu = silt_max(mu, f->mu[e]);
+    const double number = mu * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
+    const double before = f->theta;
+    if (number > FLUID_DAMPED)
+        f->theta = silt_max(f->theta, 1 - sqrt(0.25 * FLUID_DAMPED / number));
+    return f->theta > before;
+}
+
+// momentum and continuity as one system
+static silt_status factor_whole(silt_fluid *f, const silt_step *s, silt_error *err) {
+    const double tick = silt_seconds();
+    SILT_TRY(silt_stiff_factor(&f->stiff, f, s, err));
+    f->seconds_solve += silt_seconds() - tick;
+    return SILT_OK;
+}
+
+static silt_status correct_whole(silt_fluid *f, const silt_step *s, silt_error *err) {
+    const double tick = silt_seconds();
+    for (int j = 0; j < f->n_node; j++)
+        f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
+    SILT_TRY(silt_stiff_correct(f->stiff, f, f->residual, f->increment, f->w, err));
+    f->seconds_solve += silt_seconds() - tick;
+    return SILT_OK;
+}
+
 static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, silt_error *err) {
     const silt_fluid_def *def = &s->scene->fluid;
     const bool consistent = def->pressure == PRESSURE_CONSISTENT;
@@ -389,7 +428,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
     const size_t bytes = (size_t)D * (size_t)f->n_node * sizeof(double);
     double before = HUGE_VAL;
     // a first pressure has nothing to start from
-    bool first = true;
+    bool first = true, whole = false;
     silt_mix_restart(&f->mix);
     for (int i = 0; i < f->n_node && first; i++)
         first = p[i] == 0;
@@ -399,13 +438,16 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             s->drag->update(s->drag->self, f->w, p, s->dt);
         resist(f, s);
         if (f->iterations == 0) {
+            if (choose_theta(f, s))
+                silt_assemble_geometry(f, s, s->dt);
             silt_mobile_find(f, s->mesh, p);
             f->seconds_assemble += silt_seconds() - tick;
             tick = silt_seconds();
-            SILT_TRY(silt_pressure_factor(f->pressure, f, s, stiffness(f, s) > FLUID_STIFF, err));
+            whole = D == 2 && consistent && def->scheme == SCHEME_IMPLICIT && stiffness(f, s) > FLUID_STIFF;
+            SILT_TRY(silt_pressure_factor(f->pressure, f, s, stiffness(f, s) > FLUID_STIFF && !whole, err));
             f->seconds_solve += silt_seconds() - tick;
             tick = silt_seconds();
-            if (def->theta < 0.75 && !s->drag)
+            if (f->theta < 0.75 && !s->drag)
                 SILT_TRY(project_start(f, s, p, err));
             if (f->shift) {
                 silt_assemble_geometry(f, s, s->dt);
@@ -413,6 +455,8 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             }
             resist(f, s);
         }
+        if (whole && (f->iterations == 0 || silt_viscosity_varies(s->scene)))
+            SILT_TRY(factor_whole(f, s, err));
         if (f->iterations == 0 || !consistent)
             silt_assemble_projection(f, s->mesh, p);
         const double stiff = stiffness(f, s);
@@ -460,11 +504,15 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
                              place[0], place[1], f->worst, f->iterations);
         before = f->worst;
 
-        SILT_TRY(pressure_increment(f, s, 1e-3, err));
-        tick = silt_seconds();
         memcpy(f->w, f->star, bytes);
-        correct(f, s, f->increment, f->w);
-        if (stiff > FLUID_STIFF)
+        if (whole)
+            SILT_TRY(correct_whole(f, s, err));
+        else
+            SILT_TRY(pressure_increment(f, s, 1e-3, err));
+        tick = silt_seconds();
+        if (!whole)
+            correct(f, s, f->increment, f->w);
+        if (stiff > FLUID_STIFF && !whole)
             SILT_TRY(correct_stiff(f, err));
         for (int i = 0; i < f->n_node; i++)
             p[i] += f->increment[i];
@@ -483,6 +531,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     const int D = f->dim;
     if (!f->pressure)
         f->pressure = silt_pressure_create();
+    f->theta = def->theta;
     f->seconds_assemble = f->seconds_solve = 0;
     f->iterations = f->pressure_iterations = 0;
     f->projected = 0;
@@ -511,6 +560,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         // with the Laplacian the surface's pressure is prescribed
         p[i] = s->mesh->wet[i] && !(def->pressure == PRESSURE_LAPLACIAN && s->mesh->surface[i]) ? nodes->p[i] : 0;
     const silt_status status = s->mesh->n_cell ? fluid_iterate(f, s, p, err) : SILT_OK;
+    silt_stiff_end(f->stiff);
     if (status == SILT_OK) {
         reactions(f, s, p);
         for (int i = 0; i < f->n_node; i++)
@@ -526,7 +576,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
                 continue;
             // what is held keeps its velocity, the rest goes on to the end of the step
             for (int d = 0; d < D; d++)
-                nodes->v[D * i + d] += (f->w[D * i + d] - nodes->v[D * i + d]) / def->theta;
+                nodes->v[D * i + d] += (f->w[D * i + d] - nodes->v[D * i + d]) / f->theta;
             // on a bent wall the velocity turns on: contact takes it along the wall
             if (!(f->wall_normals.n_row && f->wall_normals.row[i] >= 0 && f->hold[i] == HOLD_NORMAL))
                 silt_hold_impose(f, i, nodes->v + D * i);

@@ -216,6 +216,12 @@ static double step_wanted(const silt_run *run) {
             least = silt_min(least, sqrt(h / g));
     }
     least = silt_min(least, walls_time(run));
+    // water at rest meets a belt or a lid
+    for (int k = 0; k < scene->n_wall; k++) {
+        const double speed = silt_length(3, scene->wall[k].velocity);
+        if (speed > 0)
+            least = silt_min(least, scene->fluid.size / speed);
+    }
     dt = silt_min(dt, scene->time.cfl * least);
     // it grows by half at most, and with grains by one of their steps at least
     if (run->dt > 0) {
@@ -306,6 +312,7 @@ static void water_restore(silt_run *run) {
     memcpy(run->nodes.v, run->v_old, (size_t)silt_nodes_dim(&run->nodes) * n * sizeof(double));
     memcpy(run->nodes.debt, run->debt_old, n * sizeof(double));
     silt_pressure_forget(run->fluid.pressure);
+    silt_stiff_forget(run->fluid.stiff);
 }
 
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
@@ -514,6 +521,8 @@ static silt_status step_output(silt_run *run, silt_error *err) {
         run->summary.phase[k] += run->phase[k];
     run->summary.node_steps += run->nodes.count;
     run->summary.iterations += run->fluid.iterations;
+    if (run->fluid.iterations > run->summary.most_iterations)
+        run->summary.most_iterations = run->fluid.iterations;
     run->summary.steps++;
     run->output_seconds = silt_seconds() - since;
     run->whole = true;
