@@ -12,6 +12,10 @@
 #define REFINE_ROOM 0.6     // but none nearer than this times h to another; on the boundary
 #define REFINE_RIM 0.36     // this: an edge of the surface that is not split tears, what is crowded by its node leaves
 #define REFINE_PIECES 4     // into which an edge is split at most
+// Water on a plane wall runs out in a thin wedge, which has nodes down to this thickness times h: with fewer the wedge ends
+// in a step, water falls into it, and what is cut off and paid back there keeps the shore in motion for ever. 2-D only.
+#define REFINE_WEDGE 0.1
+#define REFINE_FRESH 0.15   // and gets new ones down to this
 // cells smaller than this times h^dim are films: they break rather than fill with nodes
 static const double refine_film[4] = {0, 0, 0.25, 0.068};
 
@@ -210,6 +214,15 @@ static double refine_stretch(const refinement *r, int goes, int stays) {
     return most;
 }
 
+static bool refine_on_wall(const refinement *r, int i) {
+    return r->nodes->wall[i][0] >= 0 || r->nodes->kind[i] == NODE_CORNER;
+}
+
+// true when the edge spans a film of water from the wall to the surface
+static bool refine_spans(const refinement *r, int i, int j) {
+    return r->dim == 2 && refine_on_wall(r, i) != refine_on_wall(r, j) && r->mesh->surface[refine_on_wall(r, i) ? j : i];
+}
+
 static void refine_crowded(refinement *r) {
     const silt_mesh *mesh = r->mesh;
     r->n = 0;
@@ -219,7 +232,7 @@ static void refine_crowded(refinement *r) {
             if (j <= i || r->locked[i] || r->locked[j])
                 continue;
             const double ratio = refine_length(r, i, j) / refine_h(r, i, j);
-            if (ratio < REFINE_CROWDED)
+            if (ratio < (refine_spans(r, i, j) ? REFINE_WEDGE : REFINE_CROWDED))
                 refine_propose(r, -ratio, i, j, -1);
         }
     refine_sort(r);
@@ -380,13 +393,17 @@ static void refine_onto(const refinement *r, int n, int wall[3], double *x) {
         }
 }
 
-// true when no node, new ones included, is nearer to x than room; a and b: ends of the edge that x lies on
-static bool refine_has_room(const refinement *r, int a, int b, const double *x, double room) {
+// true when no node, new ones included, is nearer to x than room; a and b: ends of the edge that x lies on; across a film
+// on a wall nodes may be nearer
+static bool refine_has_room(const refinement *r, int a, int b, const double *x, double room, bool film) {
     double d[3];
+    const bool on = refine_on_wall(r, a);
     for (int end = 0; end < 2; end++) {
         const int i = end ? b : a;
         for (int k = r->mesh->neighbour_start[i]; k < r->mesh->neighbour_start[i + 1]; k++) {
             const int j = r->mesh->neighbour[k];
+            if (film && refine_on_wall(r, j) != on)
+                continue;
             if (j != a && j != b && !r->memory->dead[j] && refine_apart(r, j, x, d) < room)
                 return false;
             for (int m = r->fresh[j]; m >= 0; m = r->fresh_next[m])
@@ -395,6 +412,13 @@ static bool refine_has_room(const refinement *r, int a, int b, const double *x, 
         }
     }
     return true;
+}
+
+// true for an edge along a film of water on a wall: of the wall's side or of the surface
+static bool refine_edges_film(const refinement *r, int a, int b) {
+    int wall[3];
+    const bool both = r->mesh->surface[a] && r->mesh->surface[b];
+    return r->dim == 2 && (both || refine_walls(r, a, b, wall) > 0);
 }
 
 static void refine_insert(refinement *r, int a, int b, double share, bool closed, const int *around, int n_around) {
@@ -410,7 +434,13 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
     if (n_wall)
         refine_onto(r, n_wall, wall, x);
     const double h = refine_h(r, a, b);
-    if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : REFINE_RIM) * h))
+    const bool film = !closed && refine_edges_film(r, a, b);
+    if (film && !n_wall && r->walls) {
+        int element;
+        if (silt_walls_distance(r->walls, x, &element) < REFINE_FRESH * h)
+            return;
+    }
+    if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : REFINE_RIM) * h, film))
         return;
     const int i = silt_nodes_add(nodes, NODE_FLUID, -1, x);
     for (int c = 0; c < dim; c++)
@@ -458,7 +488,11 @@ static void refine_stretched(refinement *r) {
         // bed, bodies and inlets keep their own nodes
         if (nodes->kind[a] != NODE_FLUID && nodes->kind[a] == nodes->kind[b])
             continue;
-        if (cell_measure(r->mesh, nodes->x, cell) >= refine_film[dim] * pow(refine_h(r, a, b), dim))
+        bool film = false;
+        for (int s = 0; s <= dim; s++)
+            film |= refine_on_wall(r, cell[s]);
+        film = film && refine_edges_film(r, a, b);
+        if (film || cell_measure(r->mesh, nodes->x, cell) >= refine_film[dim] * pow(refine_h(r, a, b), dim))
             refine_propose(r, most, a < b ? a : b, a < b ? b : a, e);
     }
     refine_sort(r);
