@@ -172,7 +172,6 @@ static double step_wanted(const silt_run *run) {
     const silt_scene *scene = run->scene;
     const silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
-    const double g = silt_length(3, scene->gravity);
     double dt = scene->time.step > 0 ? scene->time.step : HUGE_VAL;
     dt = silt_min(dt, scene->time.output);
     if (!scene->fluid.on)
@@ -183,6 +182,9 @@ static double step_wanted(const silt_run *run) {
         if (nodes->kind[i] == NODE_CORNER || nodes->kind[i] == NODE_BED)
             continue;
         const double h = silt_node_h(nodes, i, scene->fluid.size), speed = silt_length(D, nodes->v + D * i);
+        double a[3];
+        silt_run_acceleration(run, nodes->x + D * i, a);
+        const double g = silt_length(D, a);
         if (speed > 0)
             least = silt_min(least, h / speed);
         if (g > 0)

@@ -97,6 +97,8 @@ void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def);
 // move.c ----------------------------------------------------------------------------------------------
 /** Nodes, inlets, outlets and bodies to their new places, then the new mesh. */
 silt_status silt_run_move(silt_run *run, silt_error *err);
+/** gravity and body force at a place (dim numbers), m/s2 */
+void silt_run_acceleration(const silt_run *run, const double *x, double a[3]);
 /** velocity of inlets and bodies for the step that begins */
 void silt_run_prescribe(silt_run *run);
 
