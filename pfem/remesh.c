@@ -2,6 +2,8 @@
 #include "delaunay.h"
 #include "remesh.h"
 
+#define WEDGE_LONG 3.5 // times h: longest edge of a cell in a wedge on a wall
+
 static bool polygon_contains(int n, const double *p, double x, double y) {
     bool in = false;
     for (int k = 0, m = n - 1; k < n; m = k++)
@@ -447,6 +449,18 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
 
 // ---- the next mesh
 
+// A wedge of water that runs out on a plane wall has flat cells with large circumcircles: they count by their longest edge.
+static bool wedge_cell(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const double *corner, double h) {
+    bool on = false;
+    double longest = 0;
+    for (int a = 0; a < 3 && mesh->dim == 2; a++) {
+        const int b = (a + 1) % 3;
+        on |= nodes->wall[cell[a]][0] >= 0;
+        longest = silt_max(longest, hypot(corner[2 * a] - corner[2 * b], corner[2 * a + 1] - corner[2 * b + 1]));
+    }
+    return on && longest < WEDGE_LONG * h;
+}
+
 // Which cells of the cloud are water now. @return largest circumradius of these, m
 static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
                            const silt_memory *memory, const silt_cell_set *old, int (*const cells)[4], int n_cells,
@@ -495,7 +509,8 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
         const bool flat = dim == 3 && shape.height < CELL_FLAT * h;
         if ((dim == 2 && shape.volume < 1e-9 * h * h) || cell_on_wall(mesh, nodes, cell, &shape, h))
             continue;
-        bool keep = inner || flat || shape.radius < scene->fluid.alpha * h;
+        const bool wedge = shape.radius >= scene->fluid.alpha * h && wedge_cell(mesh, nodes, cell, corner, h);
+        bool keep = inner || flat || wedge || shape.radius < scene->fluid.alpha * h;
         if (!keep)
             continue;
         cell_centre(mesh, scene, corner, centre);
@@ -508,7 +523,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
             }
             // in space a gap is between surfaces: a node from within has none to close
             keep = silt_locate(&locator, &gone, nodes->x, centre, weight) >= 0 ||
-                   (n_fluid > 0 && (dim == 2 || n_inner == 0) && cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
+                   (!wedge && n_fluid > 0 && (dim == 2 || n_inner == 0) && cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
         }
         if (!keep || cell_behind(mesh, nodes, barrier, cell, centre))
             continue;
