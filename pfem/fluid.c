@@ -436,7 +436,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
                              place[0], place[1], f->worst, f->iterations);
         before = f->worst;
 
-        SILT_TRY(pressure_increment(f, s, 1e-3, err));
+        SILT_TRY(pressure_increment(f, s, first ? 1e-6 : 1e-3, err));
         tick = silt_seconds();
         memcpy(f->w, f->star, bytes);
         correct(f, s, f->increment, f->w);
