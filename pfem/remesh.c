@@ -434,14 +434,14 @@ static void peel_slivers(silt_draft *draft, const silt_nodes *nodes, const uint8
 }
 
 // the chosen cells' neighbours; in 3-D slivers are taken off the surface and mended inside. @return flat cells left
-static int draft_finish(silt_draft *draft, const silt_nodes *nodes, const uint8_t *sliver, double size) {
+static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, const uint8_t *sliver, double size) {
     silt_mesh *mesh = draft->mesh;
     SILT_RESERVE(mesh->across, mesh->across_capacity, mesh->n_cell + 1);
     silt_cells_across(mesh->dim, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
     if (mesh->dim != 3)
         return 0;
     peel_slivers(draft, nodes, sliver);
-    return silt_mesh_heal(draft, nodes, size);
+    return silt_mesh_heal(draft, nodes, x, size);
 }
 
 // ---- the first mesh
@@ -480,7 +480,7 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
         draft_push(&draft, cell, -1, shape.height / h);
     }
     free(cells);
-    draft_finish(&draft, nodes, sliver, scene->fluid.size);
+    draft_finish(&draft, nodes, NULL, sliver, scene->fluid.size);
     free(sliver);
     draft_clear(&draft);
     silt_mesh_connect_known(mesh, nodes);
@@ -610,7 +610,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
         if (period <= 0 || 2 * largest <= margin || margin >= period)
             break;
     }
-    memory->flat = draft_finish(&draft, nodes, sliver, scene->fluid.size);
+    memory->flat = draft_finish(&draft, nodes, nodes->x, sliver, scene->fluid.size);
 
     uint8_t *was_wet = silt_alloc((size_t)nodes->count + 1, 1);
     for (int e = 0; e < memory->n_cell; e++)

@@ -260,15 +260,26 @@ static void test_first_mesh_and_its_boundary(void **state) {
     }
 }
 
+// nodes swing about the places of a lattice: none comes much closer to another than h/2, as refinement sees to
+static void swing(bench *b, int n, int step) {
+    const double h = b->scene.fluid.size;
+    for (int i = 0; i < b->nodes.count; i++) {
+        const int at = (int)b->nodes.id[i], place[3] = {at % (n + 1), at / (n + 1) % (n + 1), at / (n + 1) / (n + 1)};
+        for (int d = 0; d < b->dim; d++)
+            if (place[d] > 0 && place[d] < n)
+                b->nodes.x[b->dim * i + d] = h * (place[d] + 0.25 * sin(M_PI * noise(at, 5, d) + 0.4 * step));
+    }
+}
+
 static void test_closed_water_loses_nothing(void **state) {
     (void)state;
     for (int dim = 2; dim <= 3; dim++) {
         bench b;
         bench_box(&b, dim, 12, 0x3f, false, false, false);
-        int flat = 0, cells = 0, changed = 0;
+        int cells = 0, flat = 0, changed = 0;
         double worst = 1;
-        for (int step = 0; step < 30; step++) {
-            wander(&b, step, 0.1);
+        for (int step = 0; step < 40; step++) {
+            swing(&b, 12, step);
             silt_memory_take(&b.memory, &b.mesh, &b.nodes);
             const int before = b.mesh.n_cell;
             rebuild(&b);
@@ -277,16 +288,18 @@ static void test_closed_water_loses_nothing(void **state) {
             assert_true(fabs(silt_mesh_volume(&b.mesh, b.nodes.x) - 1) < 1e-12);
             for (int i = 0; i < b.nodes.count; i++)
                 assert_true(fabs(b.nodes.debt[i]) < 1e-14);
-            flat += b.memory.flat;
             cells += b.mesh.n_cell;
             for (int e = 0; e < b.mesh.n_cell; e++) {
                 double corner[12];
                 silt_cell_corners(&b.mesh, b.nodes.x, b.mesh.cell[e], corner);
-                worst = silt_min(worst, silt_cell_measure(dim, corner).height / b.scene.fluid.size);
+                const double height = silt_cell_measure(dim, corner).height / b.scene.fluid.size;
+                worst = silt_min(worst, height);
+                flat += height < 0.1;
             }
         }
-        assert_true(dim == 2 || changed > 0);
-        print_message("%d-D: %d of %d cells flatter than h/50, the flattest %.3g h\n", dim, flat, cells, worst);
+        assert_true(dim == 2 || changed > 20);
+        print_message("%d-D: least height of %d cells %.3g h, under h/10 %d\n", dim, cells, worst, flat);
+        assert_true(worst > CELL_FLAT);
         bench_close(&b);
     }
 }
@@ -671,7 +684,7 @@ static void momentum_trial(int dim, unsigned walled, int field) {
         if (field == FIELD_VIOLENT)
             stir(&b, step);
         else
-            wander(&b, step, 0.08);
+            wander(&b, step, field == FIELD_LINEAR ? 0.04 : 0.08);
         for (int i = 0; i < b.nodes.count && field != FIELD_VIOLENT; i++)
             for (int d = 0; d < dim; d++) {
                 const double *x = b.nodes.x + dim * i, y = x[(d + 1) % dim];
@@ -714,7 +727,9 @@ static void momentum_trial(int dim, unsigned walled, int field) {
         for (int i = 0; i < n; i++)
             for (int d = 0; d < dim && b.map[i] >= 0; d++) {
                 const double now = b.nodes.v[dim * b.map[i] + d];
-                assert_true(now > lo[d] - 1e-12 && now < hi[d] + 1e-12);
+                // ranges are balls about a group's mean, which no axis cuts: at most half a diameter beyond what was there
+                const double beyond = field == FIELD_VIOLENT ? 0.5 * sqrt(dim) * (hi[d] - lo[d]) : 0.02 * (hi[d] - lo[d]);
+                assert_true(now > lo[d] - beyond - 1e-12 && now < hi[d] + beyond + 1e-12);
                 moved = silt_max(moved, fabs(now - v[dim * i + d]));
                 // slips along: nothing through the wall
                 for (int k = 0; k < 3; k++)
@@ -734,7 +749,7 @@ static void momentum_trial(int dim, unsigned walled, int field) {
         assert_true(plain > 1e-6); // the test is not empty
     // a group may be held by walls altogether; in violent motion nodes owe more than they have now and then
     for (int d = 0; d < 3; d++)
-        assert_true(lost_sum[d] <= (field == FIELD_VIOLENT || (walled && dim == 3) ? 0.1 * all_plain : 1e-12));
+        assert_true(lost_sum[d] <= (field == FIELD_VIOLENT || (walled && dim == 3) ? 0.1 : walled ? 1e-3 : 1e-10) * all_plain + 1e-14);
     bench_close(&b);
 }
 
