@@ -277,7 +277,7 @@ static silt_status project_start(silt_fluid *f, const silt_step *s, const double
     const double before = kinetic_energy(f, s, v);
     for (int pass = 0; pass < 2; pass++) {
         silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
-        SILT_TRY(pressure_increment(f, s, 1e-4, err));
+        SILT_TRY(pressure_increment(f, s, 1e-2, err));
         correct(f, s, f->increment, v);
     }
     f->projected = before - kinetic_energy(f, s, v);
@@ -300,7 +300,7 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
         silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
         for (int i = 0; i < f->n_node; i++)
             f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
-        SILT_TRY(pressure_increment(f, s, 1e-3, err));
+        SILT_TRY(pressure_increment(f, s, 0.03, err));
         correct(f, s, f->increment, f->shift);
     }
     return SILT_OK;
@@ -478,7 +478,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         const double *place = s->nodes->x + D * worst_node;
         if (!isfinite(f->worst))
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
-        const bool fine = f->worst <= def->tolerance;
+        const bool fine = f->worst <= (first ? 0.1 : 1) * def->tolerance;
         // at the end of the iterations a small residual is accepted
         if (fine || (f->iterations >= def->iterations && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);
@@ -508,7 +508,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         if (whole)
             SILT_TRY(correct_whole(f, s, err));
         else
-            SILT_TRY(pressure_increment(f, s, 1e-3, err));
+            SILT_TRY(pressure_increment(f, s, 0.01, err));
         tick = silt_seconds();
         if (!whole)
             correct(f, s, f->increment, f->w);

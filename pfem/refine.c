@@ -8,6 +8,7 @@
 #define REFINE_SURFACE 0.35 // this: the surface's shape hangs on them; up to the former where the surface is so flat that
 #define REFINE_SHAPE 0.01   // less than this times h^dim comes or goes with the node
 #define REFINE_FLAT 0.25    // a node nearer to a wall than this times h is pressed out
+#define REFINE_UNDER 0.1    // in space a node from within nearer than this times h to the free surface: slivers would follow, and go
 #define REFINE_ROOM 0.6     // but none nearer than this times h to another; on the boundary
 #define REFINE_RIM 0.36     // this: an edge of the surface that is not split tears; what is less dear than its node leaves
 #define REFINE_MEET 0.15
@@ -293,11 +294,12 @@ static double refine_facet_measure(const refinement *r, const int *facet) {
     return 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
 }
 
-// inner nodes pressed against a wall, the bed or a body
+// inner nodes pressed against a wall, the bed or a body, in space against the free surface
 static void refine_flat(refinement *r) {
     r->n = 0;
     for (int k = 0; k < r->mesh->n_facet; k++) {
-        if (r->mesh->facet_kind[k] == FACET_FREE || r->mesh->facet_kind[k] == FACET_INLET)
+        const bool surface = r->mesh->facet_kind[k] == FACET_FREE;
+        if ((surface && r->dim == 2) || r->mesh->facet_kind[k] == FACET_INLET)
             continue;
         int apex;
         const int e = refine_behind(r, k, &apex);
@@ -306,7 +308,7 @@ static void refine_flat(refinement *r) {
         const int *facet = r->mesh->facet[k];
         const double height = r->dim * cell_measure(r->mesh, r->nodes->x, r->mesh->cell[e]) / refine_facet_measure(r, facet);
         const double ratio = height / silt_node_h(r->nodes, apex, r->h);
-        if (ratio < REFINE_FLAT)
+        if (ratio < (surface ? REFINE_UNDER : REFINE_FLAT))
             refine_propose(r, -ratio, apex, -1, e);
     }
     refine_sort(r);
