@@ -430,6 +430,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
     // a first pressure has nothing to start from
     bool first = true, whole = false;
     silt_mix_restart(&f->mix);
+    const int most = def->iterations * (first ? 10 : 1);
     for (int i = 0; i < f->n_node && first; i++)
         first = p[i] == 0;
     for (f->iterations = 0;; f->iterations++) {
@@ -480,26 +481,26 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
         const bool fine = f->worst <= (first ? 0.1 : 1) * def->tolerance;
         // at the end of the iterations a small residual is accepted
-        if (fine || (f->iterations >= def->iterations && f->worst < 1e3 * def->tolerance)) {
+        if (fine || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);
             return astray_node(f, s, err);
         }
-        if (f->iterations >= def->iterations && f->iterations % 4 == 0 && silt_debts_relent(f))
+        if (f->iterations >= most && f->iterations % 4 == 0 && silt_debts_relent(f))
             continue;
         // only when the residual stands still, and it is no small matter
         const double little = silt_max(1e3 * def->tolerance, 1e-4);
-        if (f->iterations > def->iterations && f->iterations % 4 == 2 && f->worst > 0.9 * before &&
-            silt_pockets_relent(f, s->mesh, f->iterations >= 2 * def->iterations ? POCKET_LITTLE : POCKET_HELD, little, s->dt, p))
+        if (f->iterations > most && f->iterations % 4 == 2 && f->worst > 0.9 * before &&
+            silt_pockets_relent(f, s->mesh, f->iterations >= 2 * most ? POCKET_LITTLE : POCKET_HELD, little, s->dt, p))
             continue;
         // the last try of a step lets every node off that will not come: its volume is owed
         const bool astray = f->iterations > 3 && f->worst > 10 * before && f->worst > 0.1;
-        if (f->last_try && f->iterations < 6 * def->iterations &&
-            (astray || (f->iterations > 2 * def->iterations && f->iterations % 4 == 1)) &&
+        if (f->last_try && f->iterations < 6 * most &&
+            (astray || (f->iterations > 2 * most && f->iterations % 4 == 1)) &&
             silt_pockets_relent(f, s->mesh, POCKET_ANY, little, s->dt, p)) {
             before = HUGE_VAL;
             continue;
         }
-        if (f->iterations >= (f->last_try ? 6 : 3) * def->iterations || astray)
+        if (f->iterations >= (f->last_try ? 6 : 3) * most || astray)
             return silt_fail(err, SILT_FAILED, "continuity did not converge: a node at (%g, %g) would still gain %.2g of its volume after %d iterations",
                              place[0], place[1], f->worst, f->iterations);
         before = f->worst;
