@@ -3,19 +3,20 @@
 
 #define HAND_ROUNDS 6 // passes over a group in which some drop out because they are at the end of their range
 
-// Every group of a rebuild (book.c) is settled on its own. A node takes part with its share of the group's cells and an equal
-// part of the rest of its mass; its new velocity is the mean of its parts by mass. Two ways to keep the group's momentum: all
-// velocities stay but for one shift by what is missing, taken by those whom it does not carry out of their range; or, where
-// that cannot be or would add energy, what the losers lose goes to the winners at the losers' mean velocity (never a new
-// extremum, never more energy, but smearing).
+// Every group of a rebuild (book.c) is settled on its own. A node takes part with its share of the group's cells and an
+// equal part of the rest of its mass; its new velocity is the mean of its parts by mass. Two ways to keep the group's
+// momentum: all velocities stay but for one shift by what is missing, taken by those whom it does not carry out of
+// their range; or, where that cannot be or would add energy, what the losers lose goes to the winners at the losers'
+// mean velocity (never a new extremum, never more energy, but smearing). Energy may go up in one group as far as it
+// goes down in others; where walls hold so many nodes that momentum and energy cannot both be kept, momentum is.
 
 typedef struct part {
-    int node, now;       // old and new number; now -1: the node left
-    double old, mass;    // kg, before and after
-    const double *v;     // m/s, before
+    int node, now;                   // old and new number; now -1: the node left
+    double old, mass;                // kg, before and after
+    const double *v;                 // m/s, before
     double at[3], first[3], safe[3]; // m/s: where it stands; by the first way; what it can go back to
-    bool open;             // may still be shifted
-    double free[3][3];   // projection onto the directions in which the node is not held
+    bool open;                       // may still be shifted
+    double free[3][3];               // projection onto the directions in which the node is not held
     bool held;
 } part;
 
@@ -29,6 +30,8 @@ typedef struct ledger {
     double *rest;             // kg, old number: each of a node's parts has this much besides its share of the group
     double *mass, *momentum;  // new number: sums over the parts
     double *least, *most;     // new number, dim each: range of the parts' velocities
+    double *gain;             // J, one per group: what it has more than before, when nothing holds it back
+    double share;             // of the gains that are allowed
     double lost[3];
 } ledger;
 
@@ -89,7 +92,8 @@ static double part_limit(const ledger *l, const part *p, const double lo[3], con
 }
 
 // Shifts the parts, all by the same where they may, until the group has the wanted momentum. @return false: it has not
-static bool group_fill(const ledger *l, part *list, int n, const double wanted[3], const double lo[3], const double hi[3]) {
+static bool group_fill(const ledger *l, part *list, int n, const double wanted[3], const double lo[3],
+                       const double hi[3]) {
     for (int k = 0; k < n; k++)
         list[k].open = list[k].now >= 0 && list[k].mass > 0;
     for (int round = 0;; round++) {
@@ -143,14 +147,15 @@ static void group_brake(const ledger *l, part *list, int n, double energy) {
         }
     // base + linear s + square s^2 = energy
     const double room = energy - base;
-    const double share =
-        room <= 0 || square <= 0 ? 0 : silt_clamp((sqrt(linear * linear + 4 * square * room) - linear) / (2 * square), 0, 1);
+    const double share = room <= 0 || square <= 0
+                             ? 0
+                             : silt_clamp((sqrt(linear * linear + 4 * square * room) - linear) / (2 * square), 0, 1);
     for (int k = 0; k < n; k++)
         for (int d = 0; d < l->dim; d++)
             list[k].at[d] = list[k].safe[d] + share * (list[k].at[d] - list[k].safe[d]);
 }
 
-static void group_hand_on(ledger *l, part *list, int n) {
+static void group_hand_on(ledger *l, int group, part *list, int n) {
     const int dim = l->dim;
     double out = 0, in = 0, given[3] = {0}, lo[3], hi[3], energy = 0, kept = 0, wanted[3] = {0};
     for (int d = 0; d < 3; d++) {
@@ -179,8 +184,11 @@ static void group_hand_on(ledger *l, part *list, int n) {
         wanted[d] -= (out - in) * given[d];
         energy -= 0.5 * (out - in) * silt_square(given[d]);
     }
-    // what the change of the shares does to the energy of velocities that stay is no gain: so it is in a linear field
-    energy = silt_max(energy, kept);
+    // first as if what the change of the shares does to the energy of velocities that stay were no gain (so it is in a
+    // linear field), then with the gains cut to what others lose
+    const bool trial = l->share >= 1;
+    const double before = energy;
+    energy = trial ? silt_max(before, kept) : before + l->share * silt_max(0, l->gain[group]);
     // the winners mix what they have with what they are given; who owed more than he had takes what he is given
     for (int k = 0; k < n; k++) {
         part *p = &list[k];
@@ -195,24 +203,27 @@ static void group_hand_on(ledger *l, part *list, int n) {
     }
     const bool filled = group_fill(l, list, n, wanted, lo, hi);
     energy *= 1 + 1e-14;
-    if (!filled || group_energy(l, list, n) > energy) {
+    const double first = group_energy(l, list, n);
+    if (!filled || first > energy) {
         for (int k = 0; k < n; k++)
             for (int d = 0; d < dim; d++) {
-                const double first = list[k].at[d];
+                list[k].first[d] = list[k].at[d];
                 list[k].at[d] = list[k].safe[d];
-                list[k].first[d] = first;
             }
-        // what held nodes could not take
-        group_fill(l, list, n, wanted, lo, hi);
-        if (group_energy(l, list, n) > energy)
-            group_brake(l, list, n, energy);
-        else if (filled) {
+        // what held nodes could not take; momentum comes before energy
+        const bool refilled = group_fill(l, list, n, wanted, lo, hi);
+        const double least = group_energy(l, list, n);
+        if (!filled) {
+            if (!refilled && least > energy)
+                group_brake(l, list, n, energy);
+        } else {
             for (int k = 0; k < n; k++)
                 for (int d = 0; d < dim; d++) {
                     list[k].safe[d] = list[k].at[d];
                     list[k].at[d] = list[k].first[d];
                 }
-            group_brake(l, list, n, energy);
+            if (refilled && least < first)
+                group_brake(l, list, n, silt_max(energy, least));
         }
     }
     for (int k = 0; k < n; k++) {
@@ -230,12 +241,47 @@ static void group_hand_on(ledger *l, part *list, int n) {
     }
     for (int d = 0; d < dim; d++)
         l->lost[d] += wanted[d];
+    if (trial)
+        l->gain[group] = group_energy(l, list, n) - before;
+}
+
+// settles all groups and sums up what the nodes have of them
+static void ledger_run(ledger *l, const double *debt, const int *map) {
+    const int count_all = l->dim * l->nodes->count;
+    memset(l->mass, 0, (size_t)l->nodes->count * sizeof *l->mass);
+    memset(l->momentum, 0, (size_t)count_all * sizeof *l->momentum);
+    memset(l->lost, 0, sizeof l->lost);
+    for (int k = 0; k < count_all; k++) {
+        l->least[k] = HUGE_VAL;
+        l->most[k] = -HUGE_VAL;
+    }
+    int capacity = 0;
+    part *list = NULL;
+    for (int g = 0; g < l->memory->n_group; g++) {
+        const int first = l->memory->group_start[g], count = l->memory->group_start[g + 1] - first;
+        SILT_RESERVE(list, capacity, count);
+        for (int k = 0; k < count; k++) {
+            const struct silt_share *share = &l->memory->exchange[first + k];
+            const int i = share->node;
+            part *p = &list[k];
+            *p = (part){.node = i, .now = map[i], .v = l->v + l->dim * i};
+            p->old = l->density * share->before + l->rest[i] / l->count[i];
+            p->mass = p->old + l->density * share->change;
+            // cancellation leaves crumbs of either sign
+            const double crumb = 1e-12 * l->density * (fabs(share->before) + fabs(share->change) + fabs(debt[i]));
+            p->old = fabs(p->old) < crumb ? 0 : p->old;
+            p->mass = p->now < 0 || fabs(p->mass) < crumb ? 0 : p->mass;
+            part_freedom(l, p);
+        }
+        group_hand_on(l, g, list, count);
+    }
+    free(list);
 }
 
 void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, silt_nodes *nodes, double density,
                            const double *mass, const double *debt, const double *v, const int *map, double lost[3]) {
     const int dim = silt_nodes_dim(nodes), n = memory->n_node;
-    ledger l = {.memory = memory, .mesh = mesh, .nodes = nodes, .v = v, .density = density, .dim = dim};
+    ledger l = {.memory = memory, .mesh = mesh, .nodes = nodes, .v = v, .density = density, .dim = dim, .share = 1};
     l.count = silt_alloc((size_t)n + 1, sizeof *l.count);
     l.origin = silt_alloc((size_t)nodes->count + 1, sizeof *l.origin);
     l.rest = silt_alloc((size_t)n + 1, sizeof *l.rest);
@@ -243,10 +289,7 @@ void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, sil
     l.momentum = silt_alloc((size_t)(dim * nodes->count) + 1, sizeof *l.momentum);
     l.least = silt_alloc((size_t)(dim * nodes->count) + 1, sizeof *l.least);
     l.most = silt_alloc((size_t)(dim * nodes->count) + 1, sizeof *l.most);
-    for (int k = 0; k < dim * nodes->count; k++) {
-        l.least[k] = HUGE_VAL;
-        l.most[k] = -HUGE_VAL;
-    }
+    l.gain = silt_alloc((size_t)memory->n_group + 1, sizeof *l.gain);
     for (int i = 0; i < n; i++)
         if (map[i] >= 0)
             l.origin[map[i]] = i;
@@ -260,25 +303,15 @@ void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, sil
         l.count[memory->exchange[k].node]++;
         l.rest[memory->exchange[k].node] -= density * memory->exchange[k].before;
     }
-    int capacity = 0;
-    part *list = NULL;
+    ledger_run(&l, debt, map);
+    double gains = 0, losses = 0;
     for (int g = 0; g < memory->n_group; g++) {
-        const int first = memory->group_start[g], count = memory->group_start[g + 1] - first;
-        SILT_RESERVE(list, capacity, count);
-        for (int k = 0; k < count; k++) {
-            const struct silt_share *share = &memory->exchange[first + k];
-            const int i = share->node;
-            part *p = &list[k];
-            *p = (part){.node = i, .now = map[i], .v = v + dim * i};
-            p->old = density * share->before + l.rest[i] / l.count[i];
-            p->mass = p->old + density * share->change;
-            // cancellation leaves crumbs of either sign
-            const double crumb = 1e-12 * density * (fabs(share->before) + fabs(share->change) + fabs(debt[i]));
-            p->old = fabs(p->old) < crumb ? 0 : p->old;
-            p->mass = p->now < 0 || fabs(p->mass) < crumb ? 0 : p->mass;
-            part_freedom(&l, p);
-        }
-        group_hand_on(&l, list, count);
+        gains += silt_max(0, l.gain[g]);
+        losses -= silt_min(0, l.gain[g]);
+    }
+    if (gains > losses) {
+        l.share = losses / gains;
+        ledger_run(&l, debt, map);
     }
     for (int i = 0; i < nodes->count; i++) {
         for (int d = 0; d < dim; d++) {
@@ -291,7 +324,7 @@ void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, sil
     }
     for (int d = 0; d < 3; d++)
         lost[d] = d < dim ? l.lost[d] : 0;
-    free(list);
+    free(l.gain);
     free(l.count);
     free(l.origin);
     free(l.rest);
