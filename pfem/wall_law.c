@@ -259,9 +259,9 @@ static void toe_find(silt_wall_law *law, const silt_scene *scene, const silt_wal
         const silt_wall_point *point = &law->point[q];
         const int i = point->node;
         double ahead = 0;
-        for (int d = 0; d < dim; d++)
+        for (int d = 0; d < dim && edge[i] == 3; d++)
             ahead += (nodes->v[dim * i + d] - point->velocity[d]) * out[3 * i + d];
-        if (edge[i] == 3 && ahead > 0)
+        if (ahead > 0)
             list[n_edge++] = i;
     }
     for (int q = 0; q < law->n_point; q++) {
@@ -271,9 +271,9 @@ static void toe_find(silt_wall_law *law, const silt_scene *scene, const silt_wal
         for (int k = 0; k < n_edge; k++) {
             double way = 0, off = 0;
             for (int d = 0; d < dim; d++) {
-                const double step = shortest(mesh, d, x[dim * point->node + d] - x[dim * list[k] + d]);
-                way += step * step;
-                off += step * point->normal[d];
+                const double part = shortest(mesh, d, x[dim * point->node + d] - x[dim * list[k] + d]);
+                way += part * part;
+                off += part * point->normal[d];
             }
             // on this wall, not on one across the corner
             if (off * off < 0.25 * h * h && way < nearest)
