@@ -454,7 +454,6 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         const double *place = s->nodes->x + D * worst_node;
         if (!isfinite(f->worst))
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
-        if (getenv("DBG")) fprintf(stderr, "t %g it %d worst %.3e at %g %g v %g %g mom %d\n", s->time, f->iterations, f->worst, place[0], place[1], f->star[D*worst_node], f->star[D*worst_node+1], f->momentum_iterations);
         const bool fine = f->worst <= def->tolerance;
         // at the end of the iterations a small residual is accepted
         if (fine || (f->iterations >= def->iterations && f->worst < 1e3 * def->tolerance)) {
