@@ -1,6 +1,7 @@
 // volume that remeshing took or gave and that is owed; water that cannot keep its volume
 #include "fluid.h"
 
+#define DEBT_CELLS 7  // without gravity: cells that the fastest water crosses while a debt is paid
 #define DEBT_CAP 0.3 // largest share of a node's volume that its debt may ask for
 
 static double gravity_size(const silt_scene *scene) {
@@ -38,7 +39,21 @@ void silt_debts_ask(silt_fluid *f, const silt_step *s) {
     if (!s->scene->fluid.volume_control)
         return;
     const double g = gravity_size(s->scene);
-    const double time = silt_max(s->scene->fluid.volume_steps * s->dt, g > 0 ? 2 * sqrt(s->scene->fluid.size / g) : 0);
+    // never faster than water falls or crosses a few cells, however short the step
+    double fastest = 0, mean[3] = {0}, mass = 0;
+    for (int i = 0; i < f->n_node; i++) {
+        mass += f->mass[i];
+        for (int d = 0; d < f->dim; d++)
+            mean[d] += f->mass[i] * f->w[f->dim * i + d];
+    }
+    for (int i = 0; i < f->n_node; i++) {
+        double own[3];
+        for (int d = 0; d < f->dim; d++)
+            own[d] = mesh->wet[i] && mass > 0 ? f->w[f->dim * i + d] - mean[d] / mass : 0;
+        fastest = silt_max(fastest, silt_length(f->dim, own));
+    }
+    const double h = s->scene->fluid.size, least = g > 0 ? 2 * sqrt(h / g) : fastest > 0 ? DEBT_CELLS * h / fastest : 0;
+    const double time = silt_max(s->scene->fluid.volume_steps * s->dt, least);
     double *change = f->residual;
     for (int sweep = 0; sweep < 4; sweep++) {
         memset(change, 0, (size_t)f->n_node * sizeof(double));

@@ -10,9 +10,10 @@
 #define REFINE_FLAT 0.25    // a node nearer to a wall than this times h is pressed out
 #define REFINE_LONG 1.5     // edges longer than this times h get nodes
 #define REFINE_ROOM 0.6     // but none nearer than this times h to another; on the boundary
-#define REFINE_RIM 0.36     // this: an edge of the surface that is not split tears, what is crowded by its node leaves
+#define REFINE_RIM 0.36     // this: an edge of the surface that is not split tears; what is less dear than its node leaves
+#define REFINE_MEET 0.15
 #define REFINE_PIECES 4     // into which an edge is split at most
-// cells smaller than this times h^dim are films: they break rather than fill with nodes
+// cells at the surface that are smaller than this times h^dim are films
 static const double refine_film[4] = {0, 0, 0.25, 0.068};
 
 void silt_memory_clear(silt_memory *memory) {
@@ -380,14 +381,16 @@ static void refine_onto(const refinement *r, int n, int wall[3], double *x) {
         }
 }
 
-// true when no node, new ones included, is nearer to x than room; a and b: ends of the edge that x lies on
-static bool refine_has_room(const refinement *r, int a, int b, const double *x, double room) {
+// True when no node, new ones included, is nearer to x than room; those less dear than rank may be as near as REFINE_MEET and
+// leave afterwards. a and b: ends of the edge that x lies on, h: size there
+static bool refine_has_room(const refinement *r, int a, int b, const double *x, double room, int rank, double h) {
     double d[3];
     for (int end = 0; end < 2; end++) {
         const int i = end ? b : a;
         for (int k = r->mesh->neighbour_start[i]; k < r->mesh->neighbour_start[i + 1]; k++) {
             const int j = r->mesh->neighbour[k];
-            if (j != a && j != b && !r->memory->dead[j] && refine_apart(r, j, x, d) < room)
+            if (j != a && j != b && !r->memory->dead[j] &&
+                refine_apart(r, j, x, d) < (refine_rank(r, j) < rank ? REFINE_MEET * h : room))
                 return false;
             for (int m = r->fresh[j]; m >= 0; m = r->fresh_next[m])
                 if (refine_apart(r, r->fresh_node[m], x, d) < room)
@@ -410,7 +413,9 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
     if (n_wall)
         refine_onto(r, n_wall, wall, x);
     const double h = refine_h(r, a, b);
-    if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : REFINE_RIM) * h))
+    const bool surface = !closed && r->mesh->surface[a] && r->mesh->surface[b];
+    const int rank = (n_wall >= 2 ? 4 : n_wall) + (surface ? 2 : 0);
+    if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : REFINE_RIM) * h, rank, h))
         return;
     const int i = silt_nodes_add(nodes, NODE_FLUID, -1, x);
     for (int c = 0; c < dim; c++)
@@ -433,35 +438,73 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
         }
 }
 
+// the longest edge of n nodes, as multiple of the size
+static double refine_longest(const refinement *r, int n, const int *node, int edge[2]) {
+    double most = 0;
+    for (int s = 0; s < n; s++)
+        for (int t = s + 1; t < n; t++) {
+            const double ratio = refine_length(r, node[s], node[t]) / refine_h(r, node[s], node[t]);
+            if (ratio > most) {
+                most = ratio;
+                edge[0] = node[s] < node[t] ? node[s] : node[t];
+                edge[1] = node[s] < node[t] ? node[t] : node[s];
+            }
+        }
+    return most;
+}
+
+// true for an edge along a crease of the walls or along the line where the surface meets them
+static bool refine_crease(const refinement *r, int a, int b) {
+    int wall[3];
+    if (r->nodes->wall[a][0] < 0 || r->nodes->wall[b][0] < 0)
+        return false;
+    const int n = refine_walls(r, a, b, wall);
+    return n >= 2 || (n == 1 && r->mesh->surface[a] && r->mesh->surface[b]);
+}
+
+// Edges that are too long: each cell's longest; in space also each boundary facet's longest and those along creases, which
+// the diagonals of cells and facets would always outrun.
+static void refine_long(refinement *r) {
+    int edge[2];
+    r->n = 0;
+    for (int e = 0; e < r->mesh->n_cell; e++) {
+        const double most = refine_longest(r, r->dim + 1, r->mesh->cell[e], edge);
+        if (most >= REFINE_LONG)
+            refine_propose(r, most, edge[0], edge[1], -1);
+    }
+    for (int k = 0; k < r->mesh->n_facet && r->dim == 3; k++) {
+        const int *facet = r->mesh->facet[k];
+        const double most = refine_longest(r, 3, facet, edge);
+        if (most < REFINE_LONG)
+            continue;
+        refine_propose(r, most, edge[0], edge[1], -1);
+        for (int a = 0; a < 3; a++) {
+            const int pair[2] = {facet[a], facet[(a + 1) % 3]};
+            const double ratio = refine_longest(r, 2, pair, edge);
+            if (ratio >= REFINE_LONG && ratio < most && refine_crease(r, pair[0], pair[1]))
+                refine_propose(r, ratio, edge[0], edge[1], -1);
+        }
+    }
+    refine_sort(r);
+}
+
+// Thin cells at the free surface: they break rather than fill with nodes. In space the wedges along creases are as thin, but
+// belong to the inside.
+static bool refine_is_film(const refinement *r, const int *cell, double h) {
+    bool surface = r->dim == 2;
+    for (int a = 0; a <= r->dim; a++) {
+        const int i = cell[a];
+        surface |= r->mesh->surface[i];
+        if (r->dim == 3 && !r->mesh->surface[i] && r->nodes->kind[i] == NODE_FLUID && r->nodes->wall[i][0] < 0)
+            return false;
+    }
+    return surface && cell_measure(r->mesh, r->nodes->x, cell) < refine_film[r->dim] * pow(h, r->dim);
+}
+
 static void refine_stretched(refinement *r) {
     const silt_nodes *nodes = r->nodes;
     const int dim = r->dim;
-    r->n = 0;
-    for (int e = 0; e < r->mesh->n_cell; e++) {
-        const int *cell = r->mesh->cell[e];
-        bool locked = false;
-        double most = 0;
-        int a = -1, b = -1;
-        for (int s = 0; s <= dim; s++) {
-            locked |= r->locked[cell[s]];
-            for (int t = s + 1; t <= dim; t++) {
-                const double ratio = refine_length(r, cell[s], cell[t]) / refine_h(r, cell[s], cell[t]);
-                if (ratio > most) {
-                    most = ratio;
-                    a = cell[s];
-                    b = cell[t];
-                }
-            }
-        }
-        if (locked || most < REFINE_LONG)
-            continue;
-        // bed, bodies and inlets keep their own nodes
-        if (nodes->kind[a] != NODE_FLUID && nodes->kind[a] == nodes->kind[b])
-            continue;
-        if (cell_measure(r->mesh, nodes->x, cell) >= refine_film[dim] * pow(refine_h(r, a, b), dim))
-            refine_propose(r, most, a < b ? a : b, a < b ? b : a, e);
-    }
-    refine_sort(r);
+    refine_long(r);
     r->fresh = silt_alloc((size_t)r->mesh->n_node + 1, sizeof *r->fresh);
     for (int i = 0; i < r->mesh->n_node; i++)
         r->fresh[i] = -1;
@@ -469,13 +512,19 @@ static void refine_stretched(refinement *r) {
         const int a = r->list[c].a, b = r->list[c].b;
         if (c && r->list[c - 1].a == a && r->list[c - 1].b == b)
             continue;
+        // bed, bodies and inlets keep their own nodes
+        if (nodes->kind[a] != NODE_FLUID && nodes->kind[a] == nodes->kind[b])
+            continue;
         int around[64];
         bool closed, locked = false;
+        bool film = true;
         const int n_around = refine_around(r, a, b, 64, around, &closed);
-        for (int k = 0; k < n_around; k++)
+        for (int k = 0; k < n_around; k++) {
+            film &= refine_is_film(r, r->mesh->cell[around[k]], refine_h(r, a, b));
             for (int s = 0; s <= dim; s++)
                 locked |= r->locked[r->mesh->cell[around[k]][s]];
-        if (locked)
+        }
+        if (locked || film)
             continue;
         const int pieces = (int)silt_clamp(floor(r->list[c].key + 0.5), 2, REFINE_PIECES);
         for (int m = 1; m < pieces; m++)

@@ -5,6 +5,8 @@
 
 #include "run.h"
 
+#define PRESSURE_SLOPE 0.2 // largest share by which output carries the pressure on to the end of the step
+
 static volatile sig_atomic_t run_asked, run_stop; // a signal asked for a checkpoint; SIGTERM came
 
 static void on_signal(int number) {
@@ -22,11 +24,14 @@ static void phase_add(silt_run *run, silt_phase phase, double since) { run->phas
         phase_add(run, PHASE_##name, since_);                                                                          \
     } while (0)
 
-static void run_view(const silt_run *run, silt_view *view) {
+static void run_view(silt_run *run, silt_view *view) {
     const silt_scene *scene = run->scene;
     *view = (silt_view){.scene = scene, .ledger = &run->ledger, .step = run->step, .time = run->time, .dt = run->dt};
     if (scene->fluid.on) {
-        view->nodes = &run->nodes;
+        run->shown = run->nodes;
+        if (run->n_shown == run->nodes.count)
+            run->shown.p = run->p_shown;
+        view->nodes = &run->shown;
         view->mesh = &run->mesh;
         view->locator = &run->locator;
         view->solid = run->drag ? run->drag->solid : NULL;
@@ -167,12 +172,31 @@ static void ledger_balance(silt_run *run) {
 
 // ---------------------------------------------------------------- steps in time
 
+// time in which a wall that moves passes a cell of the water on it: a gate also that slides along the water
+static double walls_time(const silt_run *run) {
+    const silt_nodes *nodes = &run->nodes;
+    const silt_walls *walls = &run->walls;
+    const int D = silt_nodes_dim(nodes);
+    double least = HUGE_VAL;
+    for (int i = 0; i < nodes->count; i++)
+        for (int k = 0; k < 3 && nodes->wall[i][k] >= 0; k++) {
+            const silt_wall_motion *m = &walls->motion[walls->wall[nodes->wall[i][k]]];
+            const int up = D == 3 ? 2 : 1;
+            double v[3] = {m->velocity[0], m->velocity[1], m->velocity[2]};
+            v[0] -= m->spin * (nodes->x[D * i + up] - m->centre[up]);
+            v[up] += m->spin * (nodes->x[D * i] - m->centre[0]);
+            const double speed = silt_length(3, v);
+            if (speed > 0)
+                least = silt_min(least, silt_node_h(nodes, i, run->scene->fluid.size) / speed);
+        }
+    return least;
+}
+
 // largest step that accuracy allows: courant number, cells that do not turn over, gravity, growth
 static double step_wanted(const silt_run *run) {
     const silt_scene *scene = run->scene;
     const silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
-    const double g = silt_length(3, scene->gravity);
     double dt = scene->time.step > 0 ? scene->time.step : HUGE_VAL;
     dt = silt_min(dt, scene->time.output);
     if (!scene->fluid.on)
@@ -183,11 +207,15 @@ static double step_wanted(const silt_run *run) {
         if (nodes->kind[i] == NODE_CORNER || nodes->kind[i] == NODE_BED)
             continue;
         const double h = silt_node_h(nodes, i, scene->fluid.size), speed = silt_length(D, nodes->v + D * i);
+        double a[3];
+        silt_run_acceleration(run, nodes->x + D * i, a);
+        const double g = silt_length(D, a);
         if (speed > 0)
             least = silt_min(least, h / speed);
         if (g > 0)
             least = silt_min(least, sqrt(h / g));
     }
+    least = silt_min(least, walls_time(run));
     dt = silt_min(dt, scene->time.cfl * least);
     // it grows by half at most, and with grains by one of their steps at least
     if (run->dt > 0) {
@@ -267,6 +295,10 @@ static void water_keep(silt_run *run) {
     SILT_RESERVE(run->debt_old, run->debt_old_capacity, run->nodes.count + 1);
     memcpy(run->v_old, run->nodes.v, (size_t)D * n * sizeof(double));
     memcpy(run->debt_old, run->nodes.debt, n * sizeof(double));
+    SILT_RESERVE(run->p_old, run->p_old_capacity, run->nodes.count + 1);
+    memcpy(run->p_old, run->nodes.p, n * sizeof(double));
+    run->n_shown = -1;
+    run->n_old = run->nodes.count;
 }
 
 static void water_restore(silt_run *run) {
@@ -383,6 +415,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     memset(run->phase, 0, sizeof run->phase);
     const double before = run->dt;
+    run->dt_old = run->step > 0 ? before : 0;
     const double wanted = step_wanted(run);
     if (step_sane(run, wanted, err) != SILT_OK) {
         run->whole = false; // not worth a checkpoint
@@ -439,11 +472,31 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     return SILT_OK;
 }
 
+// The solver's pressure belongs to the middle of the step. Output shows that of its end: carried on from the step before, node by
+// node, by no more than a fifth of what it is (impacts are no slopes).
+static void pressure_show(silt_run *run) {
+    const silt_nodes *nodes = &run->nodes;
+    SILT_RESERVE(run->p_shown, run->p_shown_capacity, nodes->count + 1);
+    if (nodes->count)
+        memcpy(run->p_shown, nodes->p, (size_t)nodes->count * sizeof(double));
+    const bool known = run->dt_old > 0 && run->scene->fluid.theta < 0.75 && run->scene->fluid.shuffle == 0;
+    for (int i = 0; known && i < run->n_old; i++) {
+        const int now = run->map[i];
+        if (now < 0 || !run->mesh.wet[now] || run->p_old[i] == 0)
+            continue;
+        const double p = nodes->p[now], most = PRESSURE_SLOPE * silt_max(fabs(p), fabs(run->p_old[i]));
+        run->p_shown[now] += silt_clamp((p - run->p_old[i]) * run->dt / (run->dt + run->dt_old), -most, most);
+    }
+    run->n_shown = nodes->count;
+}
+
 // porosity at the new places, for the ledger and the frames
 static silt_status step_close(silt_run *run, silt_error *err) {
     if (run->coupling && run->scene->fluid.on)
         SILT_TRY(silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
     ledger_take(run);
+    if (run->scene->fluid.on)
+        pressure_show(run);
     return SILT_OK;
 }
 
@@ -528,6 +581,8 @@ static void run_free(silt_run *run) {
     free(run->grown_area);
     free(run->body_before);
     free(run->x_old);
+    free(run->p_old);
+    free(run->p_shown);
     free(run->v_old);
     free(run->debt_old);
     free(run->wall_before);
@@ -541,7 +596,7 @@ static void run_free(silt_run *run) {
 
 static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock,
                              silt_error *err) {
-    *run = (silt_run){.scene = scene, .def = *def, .saved_step = -1, .lock = lock};
+    *run = (silt_run){.scene = scene, .def = *def, .saved_step = -1, .lock = lock, .n_shown = -1};
     run->out = silt_text("%s", out);
     run->log = silt_text("%s/dem.log", out);
     run->worker = silt_worker_find(def->worker);

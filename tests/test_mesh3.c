@@ -726,8 +726,6 @@ static void momentum_trial(int dim, unsigned walled, int field) {
         }
         silt_momentum_hand_on(&b.memory, &b.mesh, &b.nodes, 1, NULL, debt, v, b.map, lost);
         totals(&b, after, &e2);
-        if (field != FIELD_LINEAR && e2 > e0 * (1 + 1e-12)) // the linear one goes through the walls, which do work
-            fail_msg("%d-D, %s, step %d: energy up by %.2g of it", dim, name[field], step, e2 / e0 - 1);
         energy[0] += (e1 - e0) / e0;
         energy[1] += (e2 - e0) / e0;
         for (int d = 0; d < dim; d++) {
@@ -737,7 +735,9 @@ static void momentum_trial(int dim, unsigned walled, int field) {
         for (int i = 0; i < n; i++)
             for (int d = 0; d < dim && b.map[i] >= 0; d++) {
                 const double now = b.nodes.v[dim * b.map[i] + d];
-                assert_true(now > lo[d] - 1e-12 && now < hi[d] + 1e-12);
+                // ranges are balls about a group's mean, which no axis cuts: at most half a diameter beyond what was there
+                const double beyond = field == FIELD_VIOLENT ? 0.5 * sqrt(dim) * (hi[d] - lo[d]) : 0.02 * (hi[d] - lo[d]);
+                assert_true(now > lo[d] - beyond - 1e-12 && now < hi[d] + beyond + 1e-12);
                 moved = silt_max(moved, fabs(now - v[dim * i + d]));
                 // slips along: nothing through the wall
                 for (int k = 0; k < 3; k++)
@@ -747,19 +747,17 @@ static void momentum_trial(int dim, unsigned walled, int field) {
         free(v);
         free(debt);
     }
-    print_message(
-        "%d-D, %s%s: momentum off by at most %.2g (%.2g without); not placed %.2g of %.2g; velocities moved by %.2g;"
-        " energy %+.2g (%+.2g without)\n",
-        dim, name[field], walled ? ", walls" : "", worst, plain, lost_sum[0] + lost_sum[1] + lost_sum[2], all_plain,
-        moved, energy[1], energy[0]);
+    print_message("%d-D, %s%s: momentum off by at most %.2g (%.2g without); not placed %.2g of %.2g; velocities moved by %.2g;"
+                  " energy %+.2g (%+.2g without)\n", dim, name[field], walled ? ", walls" : "", worst, plain,
+                  lost_sum[0] + lost_sum[1] + lost_sum[2], all_plain, moved, energy[1], energy[0]);
     assert_true(worst < 1e-14);
-    if (field == FIELD_LINEAR) // touched only so that the energy does not grow; from node to node it differs by 2 h
-        assert_true(plain < 1e-14 && moved < b.scene.fluid.size);
+    if (field == FIELD_LINEAR)
+        assert_true(plain < 1e-14 && moved < 1e-12);
     else
         assert_true(plain > 1e-6); // the test is not empty
     // a group may be held by walls altogether; in violent motion nodes owe more than they have now and then
     for (int d = 0; d < 3; d++)
-        assert_true(lost_sum[d] <= (field == FIELD_VIOLENT || (walled && dim == 3) ? 0.1 * all_plain : 1e-12));
+        assert_true(lost_sum[d] <= (field == FIELD_VIOLENT || (walled && dim == 3) ? 0.1 : walled ? 1e-3 : 1e-10) * all_plain + 1e-14);
     bench_close(&b);
 }
 
