@@ -3,6 +3,8 @@
 #include "delaunay.h"
 #include "remesh.h"
 
+#define WEDGE_LONG 3.5 // times h: longest edge of a cell in a wedge on a wall
+
 static bool polygon_contains(int n, const double *p, double x, double y) {
     bool in = false;
     for (int k = 0, m = n - 1; k < n; m = k++)
@@ -216,6 +218,48 @@ static bool cell_closes(const silt_mesh *mesh, const silt_nodes *nodes, const si
         }
     }
     return rate < 0;
+}
+
+// Radius of the smallest sphere around a tetrahedron. Between the surface and a node close under it lie cells as flat as caps,
+// whose circumscribed sphere may be large though no node is far from another: the water does not part there.
+static double enclosing_radius(const double *c) {
+    double best = HUGE_VAL;
+    for (int a = 0; a < 4; a++)
+        for (int b = 0; b < a; b++) {
+            double middle[3], square = 0;
+            bool in = true;
+            for (int d = 0; d < 3; d++) {
+                middle[d] = 0.5 * (c[3 * a + d] + c[3 * b + d]);
+                square += 0.25 * silt_square(c[3 * a + d] - c[3 * b + d]);
+            }
+            for (int k = 0; k < 4; k++) {
+                double off = 0;
+                for (int d = 0; d < 3; d++)
+                    off += silt_square(c[3 * k + d] - middle[d]);
+                in &= off <= square * (1 + 1e-12);
+            }
+            best = in ? silt_min(best, square) : best;
+        }
+    const bool edge = best < HUGE_VAL;
+    for (int a = 0; a < 4 && !edge; a++) {
+        const double *p = c + 3 * ((a + 1) % 4), *q = c + 3 * ((a + 2) % 4), *r = c + 3 * ((a + 3) % 4);
+        double u[3], v[3], uu = 0, vv = 0, uv = 0, off = 0, square = 0;
+        for (int d = 0; d < 3; d++) {
+            u[d] = q[d] - p[d];
+            v[d] = r[d] - p[d];
+            uu += u[d] * u[d];
+            vv += v[d] * v[d];
+            uv += u[d] * v[d];
+        }
+        const double under = 2 * (uu * vv - uv * uv);
+        for (int d = 0; d < 3; d++) {
+            const double centre = p[d] + (vv * (uu - uv) * u[d] + uu * (vv - uv) * v[d]) / under;
+            square += silt_square(p[d] - centre);
+            off += silt_square(c[3 * a + d] - centre);
+        }
+        best = off <= square ? silt_min(best, square) : best;
+    }
+    return sqrt(best);
 }
 
 // a cell's middle, within the period
@@ -452,6 +496,18 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
 
 // ---- the next mesh
 
+// A wedge of water that runs out on a plane wall has flat cells with large circumcircles: they count by their longest edge.
+static bool wedge_cell(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const double *corner, double h) {
+    bool on = false;
+    double longest = 0;
+    for (int a = 0; a < 3 && mesh->dim == 2; a++) {
+        const int b = (a + 1) % 3;
+        on |= nodes->wall[cell[a]][0] >= 0;
+        longest = silt_max(longest, hypot(corner[2 * a] - corner[2 * b], corner[2 * a + 1] - corner[2 * b + 1]));
+    }
+    return on && longest < WEDGE_LONG * h;
+}
+
 // Which cells of the cloud are water now. @return largest circumradius of these, m
 static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const silt_scene *scene,
                            const silt_barrier *barrier, const silt_memory *memory, const silt_cell_set *old,
@@ -500,7 +556,10 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
         const bool flat = dim == 3 && shape.height < CELL_FLAT * h;
         if ((dim == 2 && shape.volume < 1e-9 * h * h) || cell_on_wall(mesh, nodes, cell, &shape, h))
             continue;
-        bool keep = inner || flat || shape.radius < scene->fluid.alpha * h;
+        const double bound = scene->fluid.alpha * h;
+        const bool round = shape.radius < bound;
+        const bool wedge = !round && wedge_cell(mesh, nodes, cell, corner, h);
+        bool keep = inner || flat || wedge || round || (dim == 3 && enclosing_radius(corner) < bound);
         if (!keep)
             continue;
         cell_centre(mesh, scene, corner, centre);
@@ -513,7 +572,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
             }
             // in space a gap is between surfaces: a node from within has none to close
             keep = silt_locate(&locator, &gone, nodes->x, centre, weight) >= 0 ||
-                   (n_fluid > 0 && (dim == 2 || n_inner == 0) &&
+                   (round && n_fluid > 0 && (dim == 2 || n_inner == 0) &&
                     cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
         }
         if (!keep || cell_behind(mesh, nodes, barrier, cell, centre))
