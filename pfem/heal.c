@@ -1,10 +1,13 @@
-// slivers: four nodes nearly in a plane, which the Delaunay criterion lets pass, taken out by local exchanges of tetrahedra
+// slivers: four nodes nearly in a plane, which the Delaunay criterion lets pass, taken out by local exchanges of
+// tetrahedra
 #include "remesh.h"
 
-#define HEAL_BELOW 0.12 // cells with a smaller height than this times h are tried
-#define HEAL_RING 8     // an edge with more cells around it is left alone
+#define HEAL_BELOW  0.12 // cells with a smaller height than this times h are tried
+#define HEAL_RING   8    // an edge with more cells around it is left alone
 #define HEAL_PASSES 6
-#define HEAL_CELLS (2 * HEAL_RING)
+#define HEAL_CELLS  (2 * HEAL_RING)
+#define HEAL_STAR   128  // most cells around a node that gives way
+#define HEAL_STEP   0.02 // by which it gives way, times h, and twice and three times that
 
 typedef struct healer {
     silt_draft *draft;
@@ -177,7 +180,8 @@ static void try_edge(const healer *s, int e, const int corner[4], remedy *best) 
     }
 }
 
-// takes out the facet opposite node a: three cells around the line between the two nodes that faced each other across it
+// takes out the facet opposite node a: three cells around the line between the two nodes that faced each other across
+// it
 static void try_facet(const healer *s, int e, int a, remedy *best) {
     const silt_mesh *mesh = s->mesh;
     const int f = mesh->across[e][a];
@@ -211,7 +215,8 @@ static void try_facet(const healer *s, int e, int a, remedy *best) {
     best->old[1] = f;
     best->n_new = 3;
     for (int k = 0; k < 3; k++) {
-        memcpy(best->fresh[k], (const int[4]){facet[k], facet[(k + 1) % 3], p.node[0], p.node[1]}, sizeof best->fresh[k]);
+        memcpy(best->fresh[k], (const int[4]){facet[k], facet[(k + 1) % 3], p.node[0], p.node[1]},
+               sizeof best->fresh[k]);
         best->quality[k] = quality[k];
     }
 }
@@ -307,7 +312,8 @@ typedef struct patient {
 
 static int patient_worse(const void *a, const void *b) {
     const patient *p = a, *q = b;
-    return p->quality != q->quality ? (p->quality > q->quality) - (p->quality < q->quality) : (p->cell > q->cell) - (p->cell < q->cell);
+    return p->quality != q->quality ? (p->quality > q->quality) - (p->quality < q->quality)
+                                    : (p->cell > q->cell) - (p->cell < q->cell);
 }
 
 static void heal_cell(healer *s, int e) {
@@ -324,7 +330,83 @@ static void heal_cell(healer *s, int e) {
         s->tried[e] = 1;
 }
 
-int silt_mesh_heal(silt_draft *draft, const silt_nodes *nodes, double size) {
+// ---- what exchanges cannot mend: one of its nodes gives way a little
+
+// cells around a node, starting at one of them; false: the node lies on the boundary, or there are too many
+static bool star_walk(const silt_mesh *mesh, int e, int i, int *star, int *n) {
+    *n = 0;
+    star[(*n)++] = e;
+    for (int k = 0; k < *n; k++)
+        for (int a = 0; a < 4; a++) {
+            if (mesh->cell[star[k]][a] == i)
+                continue;
+            const int other = mesh->across[star[k]][a];
+            if (other < 0)
+                return false;
+            bool known = false;
+            for (int m = 0; m < *n && !known; m++)
+                known = star[m] == other;
+            if (known)
+                continue;
+            if (*n == HEAL_STAR)
+                return false;
+            star[(*n)++] = other;
+        }
+    return true;
+}
+
+static double cell_quality(const healer *s, int e) {
+    double corner[12];
+    silt_cell_corners(s->mesh, s->nodes->x, s->mesh->cell[e], corner);
+    return silt_cell_measure(3, corner).height / silt_cell_h(s->nodes, 4, s->mesh->cell[e], s->size);
+}
+
+// The water's volume does not change when an inner node moves; the worst of the cells around it must gain.
+static void give_way(healer *s, double *x, int e) {
+    int best_node = -1, star[HEAL_STAR], n;
+    double best_step[3] = {0}, best = s->draft->quality[e] + HEAL_TIE;
+    for (int a = 0; a < 4; a++) {
+        const int i = s->mesh->cell[e][a];
+        if (s->nodes->kind[i] != NODE_FLUID || s->nodes->wall[i][0] >= 0 || !star_walk(s->mesh, e, i, star, &n))
+            continue;
+        double corner[12], normal[3], length = 0, home[3];
+        int side[3];
+        static const int local[4] = {0, 1, 2, 3};
+        silt_cell_corners(s->mesh, x, s->mesh->cell[e], corner);
+        silt_cell_facet(3, local, a, side);
+        for (int d = 0; d < 3; d++) {
+            const int p = (d + 1) % 3, q = (d + 2) % 3;
+            const double *o = corner + 3 * side[0], *u = corner + 3 * side[1], *v = corner + 3 * side[2];
+            normal[d] =
+                (v[p] - o[p]) * (u[q] - o[q]) - (v[q] - o[q]) * (u[p] - o[p]); // away from the facet, into the cell
+            length += normal[d] * normal[d];
+        }
+        memcpy(home, x + 3 * i, sizeof home);
+        for (int try = 1; try <= 3; try++) {
+            const double reach = HEAL_STEP * try * silt_node_h(s->nodes, i, s->size) / sqrt(length);
+            for (int d = 0; d < 3; d++)
+                x[3 * i + d] = home[d] + reach * normal[d];
+            double worst = HUGE_VAL;
+            for (int k = 0; k < n && worst > best; k++)
+                worst = silt_min(worst, cell_quality(s, star[k]));
+            if (worst > best) {
+                best = worst;
+                best_node = i;
+                for (int d = 0; d < 3; d++)
+                    best_step[d] = reach * normal[d];
+            }
+        }
+        memcpy(x + 3 * i, home, sizeof home);
+    }
+    if (best_node < 0 || !star_walk(s->mesh, e, best_node, star, &n))
+        return;
+    for (int d = 0; d < 3; d++)
+        x[3 * best_node + d] += best_step[d];
+    for (int k = 0; k < n; k++)
+        s->draft->quality[star[k]] = cell_quality(s, star[k]);
+}
+
+int silt_mesh_heal(silt_draft *draft, const silt_nodes *nodes, double *x, double size) {
     silt_mesh *mesh = draft->mesh;
     healer s = {.draft = draft, .mesh = mesh, .nodes = nodes, .size = size};
     SILT_RESERVE(s.tried, s.tried_capacity, mesh->n_cell + 1);
@@ -366,6 +448,17 @@ int silt_mesh_heal(silt_draft *draft, const silt_nodes *nodes, double size) {
     while (last > 0 && mesh->cell[last - 1][0] < 0)
         last--;
     mesh->n_cell = last;
+    int n = 0;
+    for (int e = 0; x && e < mesh->n_cell; e++)
+        if (draft->quality[e] < CELL_FLAT) {
+            SILT_RESERVE(list, list_capacity, n + 1);
+            list[n++] = (patient){draft->quality[e], e};
+        }
+    if (n)
+        qsort(list, (size_t)n, sizeof *list, patient_worse);
+    for (int k = 0; k < n; k++)
+        if (draft->quality[list[k].cell] < CELL_FLAT)
+            give_way(&s, x, list[k].cell);
     for (int e = 0; e < mesh->n_cell; e++)
         n_flat += draft->quality[e] < CELL_FLAT;
     free(list);

@@ -26,8 +26,7 @@ void silt_run_prescribe(silt_run *run) {
     }
 }
 
-// gravity and body force at a place, m/s2
-static void acceleration(const silt_run *run, const double *x, double a[3]) {
+void silt_run_acceleration(const silt_run *run, const double *x, double a[3]) {
     const int D = silt_nodes_dim(&run->nodes);
     memcpy(a, run->scene->gravity, 3 * sizeof *a);
     if (run->scene->fluid.force.kind == FORMULA_NONE)
@@ -45,7 +44,7 @@ static void fly(silt_run *run, int i) {
     const int D = silt_nodes_dim(nodes);
     double *x = nodes->x + D * i, *v = nodes->v + D * i, a[3];
     const double dt = run->dt;
-    acceleration(run, x, a);
+    silt_run_acceleration(run, x, a);
     const int s = nodes->wall[i][0];
     if (s >= 0) {
         double vector[3], own[3], given[3];
@@ -87,7 +86,7 @@ static void let_go(silt_run *run) {
         // every wall that pulls
         int kept = 0, wall[3] = {-1, -1, -1};
         double a[3];
-        acceleration(run, nodes->x + D * i, a);
+        silt_run_acceleration(run, nodes->x + D * i, a);
         const double weight = fluid->mass[i] * silt_length(D, a);
         for (int k = 0; k < 3 && nodes->wall[i][k] >= 0; k++) {
             const double pull = -silt_dot(D, fluid->reaction + D * i, run->walls.normal[nodes->wall[i][k]]);

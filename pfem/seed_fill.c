@@ -7,6 +7,7 @@
 #define FILL_RATE 0.2     // of the bubbles' force, times h, in a sweep
 #define FILL_STEP 0.15    // times h: longest way in a sweep
 #define FILL_MEET 0.65    // times h: of two nodes that are closer one goes
+#define FILL_BUBBLE 0.95  // times h: in space
 #define FILL_SPIRAL 40
 #define FILL_ROUNDS 4
 static const double fill_gap[FILL_ROUNDS] = {0.85, 0.75, 0.75, 0.75}; // times h: room for a node in each round of growing
@@ -60,6 +61,11 @@ static void fill_edge(seed *s, int region, const double *a, const double *b, con
 static void part_place(const seed_part *p, const double flat[2], double x[3]) {
     for (int d = 0; d < 3; d++)
         x[d] = p->origin[d] + flat[0] * p->u[d] + flat[1] * p->v[d];
+}
+
+// m, distance at which bubbles rest: a little less than h where they press from all sides, so that edges are h in the mean
+static double part_h(const seed *s, const seed_part *p, const double *x) {
+    return (p->kind == PART_INSIDE && s->dim == 3 ? FILL_BUBBLE : 1) * seed_h(s, x);
 }
 
 // m, how deep a place lies within the part; its rim is at 0
@@ -196,7 +202,7 @@ static void part_grow(seed *s, const seed_part *p, int first, double gap, bool o
         double x[3] = {0}, direction[FILL_SPIRAL][3];
         memcpy(x, nodes->x + s->dim * queue[q], (size_t)s->dim * sizeof *x);
         const int n_direction = part_directions(s, p, x, open, direction);
-        const double h_own = seed_h(s, x);
+        const double h_own = part_h(s, p, x);
         for (int k = 0; k < n_direction; k++) {
             double y[3], h = h_own;
             for (int d = 0; d < 3; d++)
@@ -206,12 +212,12 @@ static void part_grow(seed *s, const seed_part *p, int first, double gap, bool o
             for (int pass = 0; pass < 2 && s->size; pass++) { // at the distance that is wanted half way
                 for (int d = 0; d < 3; d++)
                     y[d] = x[d] + 0.5 * h * direction[k][d];
-                h = seed_h(s, y);
+                h = part_h(s, p, y);
             }
             for (int d = 0; d < 3; d++)
                 y[d] = x[d] + h * direction[k][d];
             part_onto(s, p, y);
-            h = seed_h(s, y);
+            h = part_h(s, p, y);
             if (!part_allows(s, p, y, h) || seed_crowded(s, y, gap * h))
                 continue;
             const int i = nodes->count;
@@ -233,7 +239,7 @@ static void part_relax(seed *s, const seed_part *p, int first, int sweeps) {
     double *size = silt_alloc((size_t)nodes->count + 1, sizeof *size);
     for (int sweep = 0; sweep < sweeps; sweep++) {
         for (int i = sweep ? first : 0; i < nodes->count && sweep % 5 == 0; i++)
-            size[i] = seed_h(s, nodes->x + dim * i);
+            size[i] = part_h(s, p, nodes->x + dim * i);
         for (int i = first; i < nodes->count; i++) {
             const double *at = nodes->x + dim * i, h = size[i];
             double force[3] = {0}, to[3] = {0};
@@ -269,14 +275,14 @@ static void part_relax(seed *s, const seed_part *p, int first, int sweeps) {
 }
 
 // of two that are too close the younger goes
-static void part_thin(seed *s, int first) {
+static void part_thin(seed *s, const seed_part *p, int first) {
     silt_nodes *nodes = s->nodes;
     uint8_t *dead = silt_alloc((size_t)nodes->count + 1, 1);
     int *map = silt_alloc((size_t)nodes->count + 1, sizeof *map);
     for (int i = nodes->count - 1; i >= first; i--) {
         int list[64];
         const double *x = nodes->x + s->dim * i;
-        const int n = seed_near(s, x, FILL_MEET * seed_h(s, x), 64, list);
+        const int n = seed_near(s, x, FILL_MEET * part_h(s, p, x), 64, list);
         for (int k = 0; k < n; k++)
             dead[i] |= list[k] != i && !dead[list[k]];
     }
@@ -292,7 +298,7 @@ static void part_fill(seed *s, const seed_part *p) {
         part_grow(s, p, first, fill_gap[round], round > 0);
         part_relax(s, p, first, fill_sweeps[round]);
         if (round < FILL_ROUNDS - 1)
-            part_thin(s, first);
+            part_thin(s, p, first);
     }
     if (p->kind == PART_INSIDE)
         return;

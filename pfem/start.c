@@ -66,9 +66,10 @@ void silt_run_box(silt_run *run) {
         box_span(lo, hi, scene->body[b].at, D, silt_max(scene->body[b].scale, scene->body[b].height));
     for (int k = 0; k < scene->grains.n_grain; k++)
         box_span(lo, hi, scene->grains.grain[k].at, D, scene->grains.grain[k].diameter);
+    // nothing holds water that has no walls: it may go far
     double margin = 0;
     for (int d = 0; d < D; d++)
-        margin = silt_max(margin, 0.5 * (hi[d] - lo[d]));
+        margin = silt_max(margin, (run->walls.count ? 0.5 : 20) * (hi[d] - lo[d]));
     for (int d = 0; d < D; d++) {
         run->box_lo[d] = lo[d] - margin;
         run->box_hi[d] = hi[d] + margin;

@@ -290,8 +290,14 @@ static void elements_group(silt_walls *walls) {
         wall_cross(r[0], r[1], c);
         volume[piece[e]] += dim == 3 ? wall_dot(c, r[2]) : -c[2];
     }
+    walls->index->closed = silt_alloc((size_t)n + 1, 1);
+    for (int e = 0; e < n; e++)
+        walls->index->closed[e] = obstacle[piece[e]];
     for (int e = 0; e < n; e++)
         obstacle[e] &= volume[e] > 0;
+    walls->index->obstacle = silt_alloc((size_t)n + 1, 1);
+    for (int e = 0; e < n; e++)
+        walls->index->obstacle[e] = obstacle[piece[e]];
     wall_index_create(walls, piece, obstacle);
     free(obstacle);
     free(volume);
@@ -395,6 +401,8 @@ void silt_walls_clear(silt_walls *walls) {
         free(index->vertex);
         free(index->piece);
         free(index->bent);
+        free(index->closed);
+        free(index->obstacle);
         free(index->vertex_normal);
         free(index->place);
         free(index->place_normal);

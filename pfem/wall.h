@@ -41,6 +41,7 @@ struct silt_wall_index {
     int n_vertex;
     int (*vertex)[3];              // owned, welded corners of the elements
     int *piece;                    // owned, one per element: joined elements share a number
+    uint8_t *closed, *obstacle;    // owned, one per element: its piece has no free edges; and the water outside
     uint8_t *bent;                 // owned, one per element: its patch is not plane
     bool any_bent;
     double (*vertex_normal)[3];    // owned, 3-D: normals summed by angle (Baerentzen and Aanaes 2005)

@@ -2,6 +2,7 @@
 #include "wall.h"
 
 #define CONTACT_REACH 0.1  // times h: a surface node that comes nearer while approaching touches
+#define CONTACT_MARGIN 0.5 // times h: so far around a node in the open walls are looked for
 #define CONTACT_FILL 0.3   // times h: so near a node is put into an empty crease or corner
 #define CONTACT_SPACE 0.6  // times h: nodes in a crease leave that much room
 #define CONTACT_ON 1e-6    // times h: what counts as on an element when planes were cut with each other
@@ -21,6 +22,7 @@ typedef struct contact_node {
     double x[3], v[3], old[3];
     int e[3], n; // elements it lies on
     double h, snap;
+    bool behind;  // at least one plane near by has it behind
     bool changed; // the elements are not those it came with, its velocity has to be mended
 } contact_node;
 
@@ -249,8 +251,10 @@ static void node_slide(contact *c, contact_node *p, const double q[3]) {
 
 // The element that a node has come through since the start of the step, or touches while it moves towards it; -1: none. For a node
 // that lies on walls already only other walls that it has come through count. *q: where the way meets the element.
-static int node_meets(contact *c, const contact_node *p, double reach, double q[3]) {
+static int node_meets(contact *c, contact_node *p, double reach, double q[3]) {
     const silt_walls *walls = c->walls;
+    // nodes in the open are looked after when they got behind walls some time ago
+    const double margin = p->n ? reach + p->snap : CONTACT_MARGIN * p->h;
     int best = -1;
     double best_share = HUGE_VAL, best_now = 0;
     for (int t = 0; t < walls->index->n_tree; t++) {
@@ -262,8 +266,8 @@ static int node_meets(contact *c, const contact_node *p, double reach, double q[
         else
             memcpy(from, p->old, sizeof from);
         for (int d = 0; d < 3; d++) {
-            lo[d] = silt_min(from[d], p->x[d]) - reach - p->snap;
-            hi[d] = silt_max(from[d], p->x[d]) + reach + p->snap;
+            lo[d] = silt_min(from[d], p->x[d]) - margin;
+            hi[d] = silt_max(from[d], p->x[d]) + margin;
         }
         int n = 0;
         wall_query(walls, t, lo, hi, &c->list, &n, &c->capacity);
@@ -271,6 +275,7 @@ static int node_meets(contact *c, const contact_node *p, double reach, double q[
             const int e = c->list[k];
             const double now = height_over(walls, e, p->x), before = height_over(walls, e, from);
             double at[3], in[3], v[3];
+            p->behind |= now < -p->snap;
             if (before < -reach - p->snap)
                 continue; // was behind it already: another wall's business
             if (p->n == 0) {
@@ -284,7 +289,8 @@ static int node_meets(contact *c, const contact_node *p, double reach, double q[
                 if (!other)
                     continue;
             }
-            const double share = now < 0 && before > 0 ? before / (before - now) : p->n ? 0 : 1;
+            // what started on the plane has met it there
+            const double share = now < 0 && before > 0 ? before / (before - now) : p->n || (now < 0 && before >= -p->snap) ? 0 : 1;
             for (int d = 0; d < 3; d++)
                 at[d] = from[d] + share * (p->x[d] - from[d]);
             wall_inside(walls, e, at, in);
@@ -307,10 +313,11 @@ static int node_meets(contact *c, const contact_node *p, double reach, double q[
     return best;
 }
 
-// a node that got into a closed obstacle all the same is put on its nearest face
+// A node that got behind a closed wall all the same is put on its nearest face: out of an obstacle from wherever it is, back into
+// a tank when it is not far.
 static void node_expel(const silt_walls *walls, contact_node *p) {
     const struct silt_wall_index *index = walls->index;
-    bool near = false;
+    bool near = p->behind;
     for (int t = 0; t < index->n_tree && !near; t++) {
         const wall_box *box = &index->box[index->tree[t].root];
         near = index->tree[t].obstacle;
@@ -318,7 +325,8 @@ static void node_expel(const silt_walls *walls, contact_node *p) {
             near = p->x[d] > box->lo[d] && p->x[d] < box->hi[d];
     }
     int e, feature;
-    if (!near || silt_walls_distance(walls, p->x, &e) >= -p->snap)
+    const double distance = near ? silt_walls_distance(walls, p->x, &e) : 0;
+    if (distance >= -p->snap || !index->closed[e] || (!index->obstacle[e] && distance < -p->h))
         return;
     double on[3];
     wall_nearest(walls, e, p->x, on, &feature);

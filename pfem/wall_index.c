@@ -408,6 +408,28 @@ double silt_walls_distance(const silt_walls *walls, const double *point, int *el
     return hit.behind ? -hit.distance : hit.distance;
 }
 
+// Takes out of a list what another wall covers at x: the foot of a gate or of a box stands on the floor, between the two there is
+// no room for water, and a node in the crease before it must not go up with the foot.
+static int leave_covered(const silt_walls *walls, const double x[3], double reach, int *list, int n) {
+    int kept = 0;
+    for (int k = 0; k < n; k++) {
+        const int e = list[k];
+        double at[3];
+        int feature, other;
+        bool covered = false;
+        if (wall_nearest(walls, e, x, at, &feature) <= reach * reach && feature != 0)
+            for (int m = 0; m < n && !covered; m++) {
+                const int f = list[m];
+                covered = walls->index->piece[e] != walls->index->piece[f] &&
+                          wall_dot(walls->normal[e], walls->normal[f]) < -1 + 1e-6 &&
+                          wall_nearest(walls, f, x, at, &other) <= reach * reach;
+            }
+        if (!covered)
+            list[kept++] = e;
+    }
+    return kept;
+}
+
 int silt_walls_touching(const silt_walls *walls, const double *point, double reach, int element[3], double on[3]) {
     const int dim = wall_dim(walls);
     const double x[3] = {point[0], point[1], dim == 3 ? point[2] : 0};
@@ -421,6 +443,7 @@ int silt_walls_touching(const silt_walls *walls, const double *point, double rea
     int *list = NULL, n = 0, capacity = 0, found = 0;
     for (int t = 0; walls->count && t < walls->index->n_tree; t++)
         wall_query(walls, t, lo, hi, &list, &n, &capacity);
+    n = leave_covered(walls, x, reach, list, n);
     while (found < dim) {
         // the nearest element that turns away from those found, with a point that lies on all of them
         int best = -1;

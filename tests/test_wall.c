@@ -754,6 +754,25 @@ static void test_box_creases(void **state) {
     bench_free(b);
 }
 
+// a node that leaves a crease or a corner askew into the walls stays in; one that was lost behind a closed wall comes back
+static void test_leak(void **state) {
+    (void)state;
+    bench *b = bench_new(3);
+    bench_box(b, 1, 1, 1, WALL_SLIP);
+    bench_make(b);
+    const double x[4][3] = {{1, 0, 0.5}, {1, 1, 0}, {0.5, 1.02, -0.03}, {1.01, 1.02, -0.03}};
+    const double v[4][3] = {{0.1, -0.03, 1}, {0.2, 0.1, -0.05}, {0, 0, 0}, {0.1, 0, 0}};
+    for (int i = 0; i < 4; i++)
+        node_at(b, x[i], v[i], -1, -1);
+    for (int k = 0; k < 3; k++) {
+        step(b, 0.01, 0.1);
+        for (int i = 0; i < 4; i++)
+            assert_true(distance_at(b, b->nodes.x[3 * i], b->nodes.x[3 * i + 1], b->nodes.x[3 * i + 2], NULL) >= -1e-10);
+    }
+    assert_point(b->nodes.x, 1, 0, 0.53, 3, 1e-12);
+    bench_free(b);
+}
+
 // a box that stands on the floor of another: its edges let go, its foot is a crease with the floor's triangles
 static void test_box_on_floor(void **state) {
     (void)state;
@@ -1004,6 +1023,15 @@ static void test_gate(void **state) {
     assert_near(point[4], 0.8, 1e-15);
     free(point);
     free(ridge);
+    // before its foot floor and face hold, not the foot's underside
+    for (int k = 0; k < 9; k++) {
+        const double x[2] = {1 + 1e-5 * (k % 3 - 1), 1e-5 * (k / 3 - 1)};
+        double on[3];
+        int element[3];
+        assert_int_equal(silt_walls_touching(&b->walls, x, 1e-4, element, on), 2);
+        assert_true(element[0] + element[1] == 4 && element[0] * element[1] == 3);
+        assert_point(on, 1, 0, 0, 2, 1e-13);
+    }
     const int foot = node_at(b, (double[]){1, 0}, (double[]){0, 0}, 3, 1);
     const int low = node_at(b, (double[]){1, 0.045}, (double[]){0, 0}, 3, -1);
     const int high = node_at(b, (double[]){1, 0.4}, (double[]){0, 0}, 3, -1);
@@ -1095,7 +1123,8 @@ int main(void) {
         cmocka_unit_test(test_distance_many),  cmocka_unit_test(test_files_agree),    cmocka_unit_test(test_files_wrong),
         cmocka_unit_test(test_files_fuzzed),   cmocka_unit_test(test_share),          cmocka_unit_test(test_round_tank),
         cmocka_unit_test(test_round_obstacle), cmocka_unit_test(test_corners),        cmocka_unit_test(test_fill),
-        cmocka_unit_test(test_box_creases),    cmocka_unit_test(test_box_on_floor),   cmocka_unit_test(test_ball_slide),
+        cmocka_unit_test(test_box_creases),    cmocka_unit_test(test_leak),           cmocka_unit_test(test_box_on_floor),
+        cmocka_unit_test(test_ball_slide),
         cmocka_unit_test(test_fill_space),     cmocka_unit_test(test_motion_lands),   cmocka_unit_test(test_piston),
         cmocka_unit_test(test_gate),           cmocka_unit_test(test_lid),
     };
