@@ -2,7 +2,8 @@
 #include "fluid.h"
 
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
-#define FLUID_DAMPED 2.0    // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
+#define FLUID_FACTOR 5.0     // the same, from which a factor of the momentum pays
+#define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 
@@ -404,15 +405,18 @@ static bool choose_theta(silt_fluid *f, const silt_step *s) {
     return f->theta > before;
 }
 
-// momentum and continuity as one system
-static silt_status factor_whole(silt_fluid *f, const silt_step *s, silt_error *err) {
+// the momentum, or momentum and continuity as one system; once a step unless viscosity changes
+static silt_status factor_stiff(silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
     const double tick = silt_seconds();
-    SILT_TRY(silt_stiff_factor(&f->stiff, f, s, err));
+    if (silt_stiff_ready(f->stiff, pressure) && !silt_viscosity_varies(s->scene))
+        return SILT_OK;
+    SILT_TRY(silt_stiff_factor(&f->stiff, f, s, pressure, err));
     f->seconds_solve += silt_seconds() - tick;
     return SILT_OK;
 }
 
 static silt_status correct_whole(silt_fluid *f, const silt_step *s, silt_error *err) {
+    SILT_TRY(factor_stiff(f, s, true, err));
     const double tick = silt_seconds();
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
@@ -456,8 +460,8 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             }
             resist(f, s);
         }
-        if (whole && (f->iterations == 0 || silt_viscosity_varies(s->scene)))
-            SILT_TRY(factor_whole(f, s, err));
+        if (whole && stiffness(f, s) > FLUID_FACTOR)
+            SILT_TRY(factor_stiff(f, s, false, err));
         if (f->iterations == 0 || !consistent)
             silt_assemble_projection(f, s->mesh, p);
         const double stiff = stiffness(f, s);
