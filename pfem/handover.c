@@ -1,18 +1,20 @@
 // a rebuild changes the nodes' share of the water: the momentum of what changes hands goes with it
 #include "pfem.h"
 
+#define HAND_ROOM 1.5 // times the largest velocity relative to the group's mean
 #define HAND_ROUNDS 6 // passes over a group in which some drop out because they are at the end of their range
 
 // Every group of a rebuild (book.c) is settled on its own. A node takes part with its share of the group's cells and an equal
 // part of the rest of its mass; its new velocity is the mean of its parts by mass. Two ways to keep the group's momentum: all
 // velocities stay but for one shift by what is missing, taken by those whom it does not carry out of their range; or, where
-// that cannot be or would add energy, what the losers lose goes to the winners at the losers' mean velocity (never a new
-// extremum, never more energy, but smearing).
+// that cannot be or would add energy, what the losers lose goes to the winners at the losers' mean velocity (never out of the
+// range, never more energy, but smearing). Velocities and energies are those relative to the group's mean, and a range is a ball
+// about it: neither the speed of the whole nor the axes have a say.
 
 typedef struct part {
     int node, now;       // old and new number; now -1: the node left
     double old, mass;    // kg, before and after
-    const double *v;     // m/s, before
+    double v[3];         // m/s, before, relative to the group's mean
     double at[3], first[3], safe[3]; // m/s: where it stands; by the first way; what it can go back to
     bool open;             // may still be shifted
     double free[3][3];   // projection onto the directions in which the node is not held
@@ -28,7 +30,8 @@ typedef struct ledger {
     int dim, *count, *origin; // groups of a node (old number); old number of a node (new number)
     double *rest;             // kg, old number: each of a node's parts has this much besides its share of the group
     double *mass, *momentum;  // new number: sums over the parts
-    double *least, *most;     // new number, dim each: range of the parts' velocities
+    double *result;           // dim per part: the velocities found
+    double frame[3];          // m/s, mean velocity of the group in hand
     double lost[3];
 } ledger;
 
@@ -69,27 +72,31 @@ static bool solve_small(int n, double a[3][3], double b[3]) {
     return true;
 }
 
-// how much of a step a part may take: its velocity stays in the range of its neighbours' and of the group's
-static double part_limit(const ledger *l, const part *p, const double lo[3], const double hi[3], const double step[3]) {
-    double share = 1;
-    for (int d = 0; d < l->dim; d++) {
-        double least = silt_min(lo[d], p->at[d]), most = silt_max(hi[d], p->at[d]);
-        for (int k = l->mesh->neighbour_start[p->now]; k < l->mesh->neighbour_start[p->now + 1]; k++) {
-            const double v = l->v[l->dim * l->origin[l->mesh->neighbour[k]] + d];
-            least = silt_min(least, v);
-            most = silt_max(most, v);
-        }
-        const double rounding = 1e-13 * (fabs(least) + fabs(most));
-        if (step[d] > 0)
-            share = silt_min(share, (most + rounding - p->at[d]) / step[d]);
-        else if (step[d] < 0)
-            share = silt_min(share, (least - rounding - p->at[d]) / step[d]);
+// radius of the ball about the group's mean that a part's velocity may not leave: a little beyond the farthest of the group and of
+// its neighbours, or groups at walls have nowhere to put what is missing
+static double part_range(const ledger *l, const part *p, double group) {
+    double square = silt_max(silt_square(group), silt_dot(l->dim, p->at, p->at));
+    for (int k = l->mesh->neighbour_start[p->now]; k < l->mesh->neighbour_start[p->now + 1]; k++) {
+        const double *v = l->v + l->dim * l->origin[l->mesh->neighbour[k]];
+        double sum = 0;
+        for (int d = 0; d < l->dim; d++)
+            sum += silt_square(v[d] - l->frame[d]);
+        square = silt_max(square, sum);
     }
-    return share;
+    return HAND_ROOM * sqrt(square);
+}
+
+// how much of a step a part may take
+static double part_limit(const ledger *l, const part *p, double group, const double step[3]) {
+    const double radius = part_range(l, p, group) * (1 + 1e-13);
+    const double square = silt_dot(l->dim, step, step), linear = silt_dot(l->dim, p->at, step);
+    const double room = silt_square(radius) - silt_dot(l->dim, p->at, p->at);
+    // |at + s step| = radius
+    return square > 0 ? silt_min(1, (sqrt(linear * linear + square * silt_max(room, 0)) - linear) / square) : 1;
 }
 
 // Shifts the parts, all by the same where they may, until the group has the wanted momentum. @return false: it has not
-static bool group_fill(const ledger *l, part *list, int n, const double wanted[3], const double lo[3], const double hi[3]) {
+static bool group_fill(const ledger *l, part *list, int n, const double wanted[3], double radius) {
     for (int k = 0; k < n; k++)
         list[k].open = list[k].now >= 0 && list[k].mass > 0;
     for (int round = 0;; round++) {
@@ -115,10 +122,10 @@ static bool group_fill(const ledger *l, part *list, int n, const double wanted[3
             for (int d = 0; d < l->dim; d++)
                 for (int c = 0; c < l->dim; c++)
                     step[d] += list[k].free[d][c] * shift[c];
-            const double share = part_limit(l, &list[k], lo, hi, step);
+            const double share = part_limit(l, &list[k], radius, step);
             for (int d = 0; d < l->dim; d++)
                 list[k].at[d] += share * step[d];
-            list[k].open = share >= 1;
+            list[k].open = share > 1 - 1e-9;
         }
     }
 }
@@ -150,13 +157,28 @@ static void group_brake(const ledger *l, part *list, int n, double energy) {
             list[k].at[d] = list[k].safe[d] + share * (list[k].at[d] - list[k].safe[d]);
 }
 
-static void group_hand_on(ledger *l, part *list, int n) {
-    const int dim = l->dim;
-    double out = 0, in = 0, given[3] = {0}, lo[3], hi[3], energy = 0, kept = 0, wanted[3] = {0};
-    for (int d = 0; d < 3; d++) {
-        lo[d] = HUGE_VAL;
-        hi[d] = -HUGE_VAL;
+// velocities relative to the mean of what the group held
+static void group_frame(ledger *l, part *list, int n) {
+    double mass = 0;
+    memset(l->frame, 0, sizeof l->frame);
+    for (int k = 0; k < n; k++) {
+        const double share = silt_max(list[k].old, 0) + 1e-300;
+        mass += share;
+        for (int d = 0; d < l->dim; d++)
+            l->frame[d] += share * list[k].v[d];
     }
+    for (int d = 0; d < l->dim; d++) {
+        l->frame[d] /= mass;
+        for (int k = 0; k < n; k++)
+            list[k].v[d] -= l->frame[d];
+    }
+}
+
+// @param result  dim per part, m/s, the velocities found
+static void group_hand_on(ledger *l, part *list, int n, double *result) {
+    const int dim = l->dim;
+    double out = 0, in = 0, given[3] = {0}, radius = 0, energy = 0, kept = 0, wanted[3] = {0};
+    group_frame(l, list, n);
     for (int k = 0; k < n; k++) {
         const part *p = &list[k];
         const double change = p->mass - p->old;
@@ -167,11 +189,9 @@ static void group_hand_on(ledger *l, part *list, int n) {
             wanted[d] += p->old * p->v[d];
             energy += 0.5 * p->old * silt_square(p->v[d]);
             kept += 0.5 * p->mass * silt_square(p->v[d]);
-            if (p->old > 0 || p->held) {
-                lo[d] = silt_min(lo[d], p->v[d]);
-                hi[d] = silt_max(hi[d], p->v[d]);
-            }
         }
+        if (p->old > 0 || p->held)
+            radius = silt_max(radius, silt_length(dim, p->v));
     }
     // what leaves the water (outlets, bed) goes with the losers' velocity
     for (int d = 0; d < dim; d++) {
@@ -193,7 +213,7 @@ static void group_hand_on(ledger *l, part *list, int n) {
             p->at[d] = p->v[d];
         }
     }
-    const bool filled = group_fill(l, list, n, wanted, lo, hi);
+    const bool filled = group_fill(l, list, n, wanted, radius);
     energy *= 1 + 1e-14;
     if (!filled || group_energy(l, list, n) > energy) {
         for (int k = 0; k < n; k++)
@@ -203,7 +223,7 @@ static void group_hand_on(ledger *l, part *list, int n) {
                 list[k].first[d] = first;
             }
         // what held nodes could not take
-        group_fill(l, list, n, wanted, lo, hi);
+        group_fill(l, list, n, wanted, radius);
         if (group_energy(l, list, n) > energy)
             group_brake(l, list, n, energy);
         else if (filled) {
@@ -217,14 +237,13 @@ static void group_hand_on(ledger *l, part *list, int n) {
     }
     for (int k = 0; k < n; k++) {
         const part *p = &list[k];
+        for (int d = 0; d < dim; d++)
+            result[dim * k + d] = l->frame[d] + p->at[d];
         if (p->now < 0)
             continue;
         l->mass[p->now] += p->mass;
         for (int d = 0; d < dim; d++) {
-            const int at = dim * p->now + d;
-            l->momentum[at] += p->mass * p->at[d];
-            l->least[at] = silt_min(l->least[at], p->at[d]);
-            l->most[at] = silt_max(l->most[at], p->at[d]);
+            l->momentum[dim * p->now + d] += p->mass * (l->frame[d] + p->at[d]);
             wanted[d] -= p->mass * p->at[d];
         }
     }
@@ -241,12 +260,7 @@ void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, sil
     l.rest = silt_alloc((size_t)n + 1, sizeof *l.rest);
     l.mass = silt_alloc((size_t)nodes->count + 1, sizeof *l.mass);
     l.momentum = silt_alloc((size_t)(dim * nodes->count) + 1, sizeof *l.momentum);
-    l.least = silt_alloc((size_t)(dim * nodes->count) + 1, sizeof *l.least);
-    l.most = silt_alloc((size_t)(dim * nodes->count) + 1, sizeof *l.most);
-    for (int k = 0; k < dim * nodes->count; k++) {
-        l.least[k] = HUGE_VAL;
-        l.most[k] = -HUGE_VAL;
-    }
+    l.result = silt_alloc((size_t)(dim * memory->n_exchange) + 1, sizeof *l.result);
     for (int i = 0; i < n; i++)
         if (map[i] >= 0)
             l.origin[map[i]] = i;
@@ -269,7 +283,8 @@ void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, sil
             const struct silt_share *share = &memory->exchange[first + k];
             const int i = share->node;
             part *p = &list[k];
-            *p = (part){.node = i, .now = map[i], .v = v + dim * i};
+            *p = (part){.node = i, .now = map[i]};
+            memcpy(p->v, v + dim * i, (size_t)dim * sizeof *p->v);
             p->old = density * share->before + l.rest[i] / l.count[i];
             p->mass = p->old + density * share->change;
             // cancellation leaves crumbs of either sign
@@ -278,17 +293,37 @@ void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, sil
             p->mass = p->now < 0 || fabs(p->mass) < crumb ? 0 : p->mass;
             part_freedom(&l, p);
         }
-        group_hand_on(&l, list, count);
+        group_hand_on(&l, list, count, l.result + dim * first);
     }
-    for (int i = 0; i < nodes->count; i++) {
-        for (int d = 0; d < dim; d++) {
-            double *at = &nodes->v[dim * i + d], *p = &l.momentum[dim * i + d];
-            // parts of negative mass (debts) could carry the mean out of the range
-            if (l.mass[i] > 0 && nodes->kind[i] == NODE_FLUID)
-                *at = silt_clamp(*p / l.mass[i], l.least[dim * i + d], l.most[dim * i + d]);
-            l.lost[d] += *p - l.mass[i] * *at;
+    // parts of negative mass (debts) could carry a node's mean away: it stays in the ball about its parts' velocities
+    double *centre = silt_alloc((size_t)(dim * nodes->count) + 1, sizeof *centre);
+    double *radius = silt_alloc((size_t)nodes->count + 1, sizeof *radius);
+    for (int pass = 0; pass < 2; pass++)
+        for (int k = 0; k < memory->n_exchange; k++) {
+            const int i = memory->exchange[k].node, now = map[i];
+            double square = 0;
+            for (int d = 0; d < dim && now >= 0; d++)
+                if (pass == 0)
+                    centre[dim * now + d] += l.result[dim * k + d] / l.count[i];
+                else
+                    square += silt_square(l.result[dim * k + d] - centre[dim * now + d]);
+            if (pass && now >= 0)
+                radius[now] = silt_max(radius[now], sqrt(square));
         }
+    for (int i = 0; i < nodes->count; i++) {
+        double *at = nodes->v + dim * i, *p = l.momentum + dim * i, way[3];
+        if (l.mass[i] > 0 && nodes->kind[i] == NODE_FLUID) {
+            for (int d = 0; d < dim; d++)
+                way[d] = p[d] / l.mass[i] - centre[dim * i + d];
+            const double length = silt_length(dim, way), most = HAND_ROOM * radius[i], share = length > most ? most / length : 1;
+            for (int d = 0; d < dim; d++)
+                at[d] = centre[dim * i + d] + share * way[d];
+        }
+        for (int d = 0; d < dim; d++)
+            l.lost[d] += p[d] - l.mass[i] * at[d];
     }
+    free(centre);
+    free(radius);
     for (int d = 0; d < 3; d++)
         lost[d] = d < dim ? l.lost[d] : 0;
     free(list);
@@ -297,6 +332,5 @@ void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, sil
     free(l.rest);
     free(l.mass);
     free(l.momentum);
-    free(l.least);
-    free(l.most);
+    free(l.result);
 }

@@ -271,8 +271,9 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
 silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
                               silt_memory *memory, int *map, silt_error *err);
 
-/** Hands on momentum when a rebuild has changed the nodes' share of the water (momentum.c). With masses that count the debts,
- * m = density (share of the cells + debt), sum m v stays to rounding; no velocity leaves the range of its group and neighbours;
+/** Hands on momentum when a rebuild has changed the nodes' share of the water (handover.c). With masses that count the debts,
+ * m = density (share of the cells + debt), sum m v stays to rounding; no velocity goes farther from its group's mean than the
+ * farthest of group and neighbours;
  * a group's kinetic energy does not rise above the larger of what it was and what it would be with velocities as they are (so
  * that a linear field, whose momentum no change of mesh alters, is left alone); prescribed velocities and the walls' normals are
  * kept. Old numbering is the memory's, with the nodes that refinement added.
