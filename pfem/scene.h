@@ -256,7 +256,7 @@ typedef struct silt_gauge_def {
 int silt_gauge_columns(const silt_scene *scene, int i);
 void silt_gauge_column(const silt_scene *scene, int i, int k, char name[64]);
 
-typedef enum { NORM_L2 = 1, NORM_MAX } silt_norm;
+typedef enum { NORM_L2 = 1, NORM_MAX, NORM_MEAN } silt_norm;
 typedef enum {
     SCALAR_NONE = 0,
     SCALAR_MAX,
@@ -287,7 +287,7 @@ typedef struct silt_check_def {
     double align;       // NaN: none; else the curve is shifted in time so that both have this ordinate at the same abscissa
     double window[2];   // of the abscissa after scaling; default all
     double window_value[2]; // only where the ordinate (reference's, or the column's for a scalar) lies in here; default all
-    silt_norm norm;     // norm: l2 | max, of the difference divided by `relative_to`, or pointwise by the reference when 0
+    silt_norm norm;     // norm: l2 | max | mean, of the difference divided by `relative_to`, or pointwise by the reference when 0
     double relative_to; // default 0
     silt_scalar scalar; // scalar: max | min | last | mean | period | slope
     double value;       // expected scalar

@@ -40,7 +40,7 @@ static const silt_word shape_words[] = {
     {"box", SHAPE_BOX}, {"disc", SHAPE_DISC}, {"polygon", SHAPE_POLYGON}, {"temple", SHAPE_TEMPLE}, {0}};
 static const silt_word motion_words[] = {{"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {0}};
 static const silt_word front_words[] = {{"x", 1}, {"-x", -1}, {0}};
-static const silt_word norm_words[] = {{"l2", NORM_L2}, {"max", NORM_MAX}, {0}};
+static const silt_word norm_words[] = {{"l2", NORM_L2}, {"max", NORM_MAX}, {"mean", NORM_MEAN}, {0}};
 static const silt_word scalar_words[] = {{"none", SCALAR_NONE},
                                          {"max", SCALAR_MAX},
                                          {"min", SCALAR_MIN},
@@ -489,7 +489,8 @@ static const silt_key check_rows[] = {
      .doc = "part of the abscissa that counts"},
     {"window_value", KEY_PAIR, .fallback = "[-.inf, .inf]", .flags = KEY_INFINITE, AT(silt_check_def, window_value),
      .doc = "part of the ordinate that counts"},
-    {"norm", KEY_WORD, .fallback = "l2", .words = norm_words, AT(silt_check_def, norm), .doc = "of the difference"},
+    {"norm", KEY_WORD, .fallback = "l2", .words = norm_words, AT(silt_check_def, norm),
+     .doc = "of the difference: root of the mean square, largest, or the mean with its sign, as of a mean depth"},
     {"relative_to", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_check_def, relative_to),
      .doc = "what the difference is divided by; 0: the reference, point by point"},
     {"scalar", KEY_WORD, .fallback = "none", .words = scalar_words, .when = ONLY(CHECK_COLUMN),

@@ -188,7 +188,7 @@ static void verify_curve_check(const silt_scene *scene, const char *out, verify_
         for (int i = 0; i < history->n; i++)
             history->x[i] += there - here;
     }
-    double sum = 0, worst = 0, last = history->n ? history->x[history->n - 1] : -HUGE_VAL;
+    double sum = 0, mean = 0, worst = 0, last = history->n ? history->x[history->n - 1] : -HUGE_VAL;
     int n = 0, wanted = 0, late = 0;
     for (int i = 0; i < reference.n; i++) {
         double x = reference.x[i], r = reference.y[i];
@@ -206,6 +206,7 @@ static void verify_curve_check(const silt_scene *scene, const char *out, verify_
         }
         double e = fabs((h - r) / scale);
         sum += e * e;
+        mean += (h - r) / scale;
         n++;
         if (n == 1 || e > worst) {
             worst = e;
@@ -218,7 +219,7 @@ static void verify_curve_check(const silt_scene *scene, const char *out, verify_
     else if (late > 0 && isfinite(def->window[1]))
         verify_note(result, "the result ends at %g, %d rows of the reference in the window come later", last, late);
     else {
-        result->error = def->norm == NORM_MAX ? worst : sqrt(sum / n);
+        result->error = def->norm == NORM_MAX ? worst : def->norm == NORM_MEAN ? fabs(mean / n) : sqrt(sum / n);
         result->pass = result->error <= def->tolerance;
         verify_note(result, n < wanted ? "%d of %d rows of the reference" : "%d rows of the reference", n, wanted);
     }
