@@ -2,7 +2,8 @@
 #include "fluid.h"
 
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
-#define FLUID_DAMPED 2.0    // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
+#define FLUID_FACTOR 5.0     // the same, from which a factor of the momentum pays
+#define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 
@@ -404,15 +405,18 @@ static bool choose_theta(silt_fluid *f, const silt_step *s) {
     return f->theta > before;
 }
 
-// momentum and continuity as one system
-static silt_status factor_whole(silt_fluid *f, const silt_step *s, silt_error *err) {
+// the momentum, or momentum and continuity as one system; once a step unless viscosity changes
+static silt_status factor_stiff(silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
     const double tick = silt_seconds();
-    SILT_TRY(silt_stiff_factor(&f->stiff, f, s, err));
+    if (silt_stiff_ready(f->stiff, pressure) && !silt_viscosity_varies(s->scene))
+        return SILT_OK;
+    SILT_TRY(silt_stiff_factor(&f->stiff, f, s, pressure, err));
     f->seconds_solve += silt_seconds() - tick;
     return SILT_OK;
 }
 
 static silt_status correct_whole(silt_fluid *f, const silt_step *s, silt_error *err) {
+    SILT_TRY(factor_stiff(f, s, true, err));
     const double tick = silt_seconds();
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
@@ -430,6 +434,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
     // a first pressure has nothing to start from
     bool first = true, whole = false;
     silt_mix_restart(&f->mix);
+    const int most = def->iterations * (first ? 10 : 1);
     for (int i = 0; i < f->n_node && first; i++)
         first = p[i] == 0;
     for (f->iterations = 0;; f->iterations++) {
@@ -455,8 +460,8 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             }
             resist(f, s);
         }
-        if (whole && (f->iterations == 0 || silt_viscosity_varies(s->scene)))
-            SILT_TRY(factor_whole(f, s, err));
+        if (whole && stiffness(f, s) > FLUID_FACTOR)
+            SILT_TRY(factor_stiff(f, s, false, err));
         if (f->iterations == 0 || !consistent)
             silt_assemble_projection(f, s->mesh, p);
         const double stiff = stiffness(f, s);
@@ -480,26 +485,26 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
         const bool fine = f->worst <= (first ? 0.1 : 1) * def->tolerance;
         // at the end of the iterations a small residual is accepted; a first pressure takes longer to meet its projection
-        if (fine || (f->iterations >= (first ? 3 : 1) * def->iterations && f->worst < 1e3 * def->tolerance)) {
+        if (fine || (f->iterations >= (first ? 3 : 1) * most && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);
             return astray_node(f, s, err);
         }
-        if (f->iterations >= def->iterations && f->iterations % 4 == 0 && silt_debts_relent(f))
+        if (f->iterations >= most && f->iterations % 4 == 0 && silt_debts_relent(f))
             continue;
         // only when the residual stands still, and it is no small matter
         const double little = silt_max(1e3 * def->tolerance, 1e-4);
-        if (f->iterations > def->iterations && f->iterations % 4 == 2 && f->worst > 0.9 * before &&
-            silt_pockets_relent(f, s->mesh, f->iterations >= 2 * def->iterations ? POCKET_LITTLE : POCKET_HELD, little, s->dt, p))
+        if (f->iterations > most && f->iterations % 4 == 2 && f->worst > 0.9 * before &&
+            silt_pockets_relent(f, s->mesh, f->iterations >= 2 * most ? POCKET_LITTLE : POCKET_HELD, little, s->dt, p))
             continue;
         // the last try of a step lets every node off that will not come: its volume is owed
         const bool astray = f->iterations > 3 && f->worst > 10 * before && f->worst > 0.1;
-        if (f->last_try && f->iterations < 6 * def->iterations &&
-            (astray || (f->iterations > 2 * def->iterations && f->iterations % 4 == 1)) &&
+        if (f->last_try && f->iterations < 6 * most &&
+            (astray || (f->iterations > 2 * most && f->iterations % 4 == 1)) &&
             silt_pockets_relent(f, s->mesh, POCKET_ANY, little, s->dt, p)) {
             before = HUGE_VAL;
             continue;
         }
-        if (f->iterations >= (f->last_try ? 6 : 3) * def->iterations || astray)
+        if (f->iterations >= (f->last_try ? 6 : 3) * most || astray)
             return silt_fail(err, SILT_FAILED, "continuity did not converge: a node at (%g, %g) would still gain %.2g of its volume after %d iterations",
                              place[0], place[1], f->worst, f->iterations);
         before = f->worst;

@@ -93,6 +93,12 @@ struct silt_run {
     double box_lo[3], box_hi[3]; // what lies outside has left
 };
 
+// ledger.c --------------------------------------------------------------------------------------------
+/** volume, mass, momentum, energy and sediment of the state, and their errors so far */
+void silt_run_ledger(silt_run *run);
+/** forces of the step that was solved: what the water's momentum leaves open, and whether what grains got the water lost */
+void silt_run_balance(silt_run *run);
+
 // start.c ---------------------------------------------------------------------------------------------
 void silt_run_box(silt_run *run);
 silt_status silt_run_first(silt_run *run, silt_error *err);
