@@ -434,9 +434,9 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
     // a first pressure has nothing to start from
     bool first = true, whole = false;
     silt_mix_restart(&f->mix);
-    const int most = def->iterations * (first ? 10 : 1);
     for (int i = 0; i < f->n_node && first; i++)
         first = p[i] == 0;
+    const int most = def->iterations * (first ? 10 : 1);
     for (f->iterations = 0;; f->iterations++) {
         double tick = silt_seconds();
         if (s->drag && s->drag->update)
@@ -485,7 +485,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
         const bool fine = f->worst <= (first ? 0.1 : 1) * def->tolerance;
         // at the end of the iterations a small residual is accepted; a first pressure takes longer to meet its projection
-        if (fine || (f->iterations >= (first ? 3 : 1) * most && f->worst < 1e3 * def->tolerance)) {
+        if (fine || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);
             return astray_node(f, s, err);
         }
