@@ -434,9 +434,9 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
     // a first pressure has nothing to start from
     bool first = true, whole = false;
     silt_mix_restart(&f->mix);
-    const int most = def->iterations * (first ? 10 : 1);
     for (int i = 0; i < f->n_node && first; i++)
         first = p[i] == 0;
+    const int most = def->iterations * (first ? 10 : 1);
     for (f->iterations = 0;; f->iterations++) {
         double tick = silt_seconds();
         if (s->drag && s->drag->update)
