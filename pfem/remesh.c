@@ -1,4 +1,5 @@
-// decides what is water: Delaunay of the cloud, held against what was water a step ago; books the volume that this makes or loses
+// decides what is water: Delaunay of the cloud, held against what was water a step ago; books the volume that this
+// makes or loses
 #include "delaunay.h"
 #include "remesh.h"
 
@@ -86,7 +87,8 @@ void silt_cell_set_clear(silt_cell_set *set) {
 // ---- what a cell of the cloud is
 
 // nodes all on one patch of the walls make no cell where they lie flat on it
-static bool cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const silt_cell_shape *shape, double h) {
+static bool cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const silt_cell_shape *shape,
+                         double h) {
     return silt_mesh_share(mesh, nodes, mesh->dim + 1, cell) && shape->height < CELL_FLAT * h;
 }
 
@@ -106,8 +108,9 @@ static bool were_joined(const silt_mesh *mesh, int i, int j) {
     return false;
 }
 
-// How wide a gap a tetrahedron spans: a flat one may lie across a wide gap, so what counts is how far those of its corners are
-// apart that no edge of the water joins. `mesh` still has the adjacency of the old cells, `rim` the old boundary's facets.
+// How wide a gap a tetrahedron spans: a flat one may lie across a wide gap, so what counts is how far those of its
+// corners are apart that no edge of the water joins. `mesh` still has the adjacency of the old cells, `rim` the old
+// boundary's facets.
 static double gap_width(const silt_mesh *mesh, const silt_cell_set *rim, const int *cell, const double *corner,
                         const silt_cell_shape *shape) {
     int group[4] = {0, 1, 2, 3}, n_group = 4, size[4] = {0};
@@ -140,7 +143,8 @@ static double gap_width(const silt_mesh *mesh, const silt_cell_set *rim, const i
     }
     for (int a = 0; a < 4 && n_group == 2; a++)
         if (size[group[a]] == 1) { // a node before a facet
-            const double *p = corner + 3 * ((a + 1) % 4), *q = corner + 3 * ((a + 2) % 4), *r = corner + 3 * ((a + 3) % 4);
+            const double *p = corner + 3 * ((a + 1) % 4), *q = corner + 3 * ((a + 2) % 4),
+                         *r = corner + 3 * ((a + 3) % 4);
             double square = 0;
             for (int d = 0; d < 3; d++) {
                 const int m = (d + 1) % 3, n = (d + 2) % 3;
@@ -276,18 +280,19 @@ static bool cell_behind(const silt_mesh *mesh, const silt_nodes *nodes, const si
 
 // ---- the cloud's triangulation
 
-static void mesh_prepare(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier) {
+static void mesh_prepare(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene,
+                         const silt_barrier *barrier) {
     mesh->dim = silt_nodes_dim(nodes);
     mesh->walls = barrier->walls;
     mesh->period[0] = silt_max(0, scene->period[1] - scene->period[0]);
     mesh->period[1] = mesh->period[2] = 0;
 }
 
-// Cells of the live nodes. Where x is periodic, nodes nearer to its ends than `margin` are put beyond the other end too, and
-// of the copies of a cell the one is kept in which its lowest node is no copy. Coordinates are whole parts of the period
-// then: both copies have the same numbers but for a whole shift, so that ties are broken alike in both.
-static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const uint8_t *dead,
-                               double margin, int (**cells)[4], int *n_cell, silt_error *err) {
+// Cells of the live nodes. Where x is periodic, nodes nearer to its ends than `margin` are put beyond the other end
+// too, and of the copies of a cell the one is kept in which its lowest node is no copy. Coordinates are whole parts of
+// the period then: both copies have the same numbers but for a whole shift, so that ties are broken alike in both.
+static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene,
+                               const uint8_t *dead, double margin, int (**cells)[4], int *n_cell, silt_error *err) {
     const int n = nodes->count, dim = mesh->dim, n_corner = dim + 1;
     const double period = mesh->period[0], parts = 17592186044416.0, scale = period > 0 ? parts / period : 1; // 2^44
     int m = 0, room = 0, x_room = 0, *live = NULL;
@@ -359,8 +364,8 @@ static void draft_clear(silt_draft *draft) {
     free(draft->quality);
 }
 
-// Slivers that can be reached from the open go, those within the water stay (without them there would be holes of no volume).
-// Through walls nothing is reached.
+// Slivers that can be reached from the open go, those within the water stay (without them there would be holes of no
+// volume). Through walls nothing is reached.
 static void peel_slivers(silt_draft *draft, const silt_nodes *nodes, const uint8_t *sliver) {
     silt_mesh *mesh = draft->mesh;
     const int n = mesh->n_cell;
@@ -448,9 +453,9 @@ static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, c
 
 // ---- the first mesh
 
-silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
-                            silt_error *err) {
-    int (*cells)[4] = NULL, n_cells = 0, sliver_capacity = 0;
+silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene,
+                            const silt_barrier *barrier, silt_error *err) {
+    int(*cells)[4] = NULL, n_cells = 0, sliver_capacity = 0;
     uint8_t *sliver = NULL;
     mesh_prepare(mesh, nodes, scene, barrier);
     const int dim = mesh->dim;
@@ -504,9 +509,9 @@ static bool wedge_cell(const silt_mesh *mesh, const silt_nodes *nodes, const int
 }
 
 // Which cells of the cloud are water now. @return largest circumradius of these, m
-static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
-                           const silt_memory *memory, const silt_cell_set *old, int (*const cells)[4], int n_cells,
-                           uint8_t **sliver) {
+static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const silt_scene *scene,
+                           const silt_barrier *barrier, const silt_memory *memory, const silt_cell_set *old,
+                           int (*const cells)[4], int n_cells, uint8_t **sliver) {
     silt_mesh *mesh = draft->mesh;
     const int dim = mesh->dim;
     int sliver_capacity = 0;
@@ -530,7 +535,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
     silt_locator locator = {0};
     silt_locator_build(&locator, &gone, nodes->x, scene->fluid.size);
     // the old surface, as cells without a fourth node
-    int (*facet)[4] = silt_alloc((size_t)mesh->n_facet + 1, sizeof *facet);
+    int(*facet)[4] = silt_alloc((size_t)mesh->n_facet + 1, sizeof *facet);
     for (int k = 0; dim == 3 && k < mesh->n_facet; k++) {
         memcpy(facet[k], mesh->facet[k], sizeof mesh->facet[k]);
         facet[k][3] = -1;
@@ -567,7 +572,8 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
             }
             // in space a gap is between surfaces: a node from within has none to close
             keep = silt_locate(&locator, &gone, nodes->x, centre, weight) >= 0 ||
-                   (round && n_fluid > 0 && (dim == 2 || n_inner == 0) && cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
+                   (round && n_fluid > 0 && (dim == 2 || n_inner == 0) &&
+                    cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
         }
         if (!keep || cell_behind(mesh, nodes, barrier, cell, centre))
             continue;
@@ -610,7 +616,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
     uint8_t *sliver = NULL;
     // copies beyond a periodic border must reach as far as the largest empty sphere of the water
     for (double margin = 3 * scene->fluid.alpha * h;; margin *= 2) {
-        int (*cells)[4] = NULL, n_cells = 0;
+        int(*cells)[4] = NULL, n_cells = 0;
         const silt_status status = cloud_cells(mesh, nodes, scene, memory->dead, margin, &cells, &n_cells, err);
         if (status != SILT_OK) {
             silt_cell_set_clear(&old);
