@@ -124,14 +124,14 @@ static void find_excess(silt_fluid *f, const silt_step *s, const double *right) 
     for (int i = 0; i < f->n_node; i++) {
         for (int d = 0; d < D; d++)
             a[D * i + d] = s->mesh->wet[i] && f->mass[i] > 0 ? a[D * i + d] / f->mass[i] : 0;
-        // a body force is loaded at the nodes, not as a P1 field: it has no excess
+        // a body force is loaded at the nodes, not as a P1 field: it has no excess, whatever holds the nodes
+        silt_hold_project(f, i, a + D * i);
         if (s->scene->fluid.force.kind != FORMULA_NONE) {
             double b[3];
             body_force(f, s, i, b);
             for (int d = 0; d < D && s->mesh->wet[i]; d++)
                 a[D * i + d] -= b[d];
         }
-        silt_hold_project(f, i, a + D * i);
     }
     silt_assemble_mass_excess(f, s->mesh, s->scene->fluid.density, a, f->excess);
 }
@@ -484,7 +484,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         if (!isfinite(f->worst))
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
         const bool fine = f->worst <= (first ? 0.1 : 1) * def->tolerance;
-        // at the end of the iterations a small residual is accepted
+        // at the end of the iterations a small residual is accepted; a first pressure takes longer to meet its projection
         if (fine || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);
             return astray_node(f, s, err);
