@@ -1,5 +1,6 @@
-// stiff viscosity in two dimensions: momentum and continuity are factored as one system, and the momentum alone for its own solver.
-// [A -G; -G^T -L] is symmetric and quasi-definite: every order of elimination has an LDL^T factor (Vanderbei, SIAM J. Optim. 5, 1995).
+// stiff viscosity in two dimensions: momentum and continuity are factored as one system, and the momentum alone for
+// its own solver. [A -G; -G^T -L] is symmetric and quasi-definite: every order of elimination has an LDL^T factor
+// (Vanderbei, SIAM J. Optim. 5, 1995).
 // Node by node, the velocities first, with the order of the nodes that suits their graph.
 #include <cholmod.h>
 
@@ -100,7 +101,8 @@ static void pattern(silt_stiff *q, silt_blocks *b, const silt_mesh *mesh, int m,
     for (int k = 0; k < n; k++)
         for (int c = 0; c < m; c++)
             perm[m * k + c] = m * order[k] + c;
-    q->common.supernodal = m == 2 ? CHOLMOD_AUTO : CHOLMOD_SIMPLICIAL; // supernodes are for positive definite matrices only
+    // supernodes are for positive definite matrices only
+    q->common.supernodal = m == 2 ? CHOLMOD_AUTO : CHOLMOD_SIMPLICIAL;
     b->factor = cholmod_analyze_p(b->matrix, perm, NULL, 0, &q->common);
     free(perm);
 }
@@ -112,7 +114,8 @@ static int *node_order(silt_stiff *q, const silt_mesh *mesh) {
     for (int j = 0; j < n; j++)
         for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
             filled += mesh->neighbour[k] >= j;
-    cholmod_sparse *graph = cholmod_allocate_sparse((size_t)n, (size_t)n, filled, 1, 1, -1, CHOLMOD_PATTERN, &q->common);
+    cholmod_sparse *graph = cholmod_allocate_sparse((size_t)n, (size_t)n, filled, 1, 1, -1, CHOLMOD_PATTERN,
+                                                    &q->common);
     int *start = graph->p, *index = graph->i, at = 0;
     for (int j = 0; j < n; j++) {
         start[j] = at;
@@ -154,7 +157,8 @@ static void assemble(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh) 
     memset(q->entry, 0, (size_t)(M * M * mesh->neighbour_start[mesh->n_node]) * sizeof *q->entry);
     for (int e = 0; e < mesh->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        const double *flux = f->flux + M * D * e, viscous = f->mu[e] * f->inverse[e], smooth = f->tau[e] * f->inverse[e];
+        const double *flux = f->flux + M * D * e;
+        const double viscous = f->mu[e] * f->inverse[e], smooth = f->tau[e] * f->inverse[e];
         for (int a = 0; a < M; a++)
             for (int b = 0; b < M; b++) {
                 double *out = q->entry + M * M * entry_index(mesh, cell[a], cell[b]);
@@ -221,7 +225,8 @@ static void fill(const silt_stiff *q, silt_blocks *b, const silt_mesh *mesh) {
             }
 }
 
-silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
+silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const silt_step *s, bool pressure,
+                              silt_error *err) {
     const silt_mesh *mesh = s->mesh;
     if (!*stiff) {
         *stiff = silt_alloc(1, sizeof **stiff);
@@ -261,9 +266,11 @@ silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const sil
 
 static silt_status solve(silt_stiff *q, silt_blocks *b, double *right, silt_error *err) {
     const size_t n = (size_t)(b->m * q->n);
-    cholmod_dense in = {.nrow = n, .ncol = 1, .nzmax = n, .d = n, .x = right, .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
+    cholmod_dense in = {.nrow = n, .ncol = 1, .nzmax = n, .d = n, .x = right, .xtype = CHOLMOD_REAL,
+                        .dtype = CHOLMOD_DOUBLE};
     if (!cholmod_solve2(CHOLMOD_A, b->factor, &in, NULL, &q->solution, NULL, &q->work_y, &q->work_e, &q->common))
-        return silt_fail(err, SILT_FAILED, "the stiff water's system could not be solved (CHOLMOD status %d)", q->common.status);
+        return silt_fail(err, SILT_FAILED, "the stiff water's system could not be solved (CHOLMOD status %d)",
+                         q->common.status);
     memcpy(right, q->solution->x, n * sizeof *right);
     return SILT_OK;
 }
@@ -276,7 +283,8 @@ silt_status silt_stiff_momentum(silt_stiff *q, const silt_fluid *f, const double
     return SILT_OK;
 }
 
-silt_status silt_stiff_correct(silt_stiff *q, const silt_fluid *f, const double *right, double *increment, double *v, silt_error *err) {
+silt_status silt_stiff_correct(silt_stiff *q, const silt_fluid *f, const double *right, double *increment, double *v,
+                               silt_error *err) {
     for (int i = 0; i < q->n; i++) {
         q->right[3 * i] = q->right[3 * i + 1] = 0;
         q->right[3 * i + 2] = -right[i];
