@@ -66,40 +66,38 @@ static inline __attribute__((always_inline)) double bounded_inverse(const int D,
 
 KERNEL geometry(const int D, silt_fluid *f, const silt_step *s, double dt) {
     const silt_mesh *mesh = s->mesh;
-    const double rho = s->scene->fluid.density, theta_dt = s->scene->fluid.theta * s->dt;
+    const double rho = s->scene->fluid.density, theta_dt = f->theta * s->dt;
     const double *solid = s->drag ? s->drag->solid : NULL, *x = s->nodes->x;
-    double *end = f->scratch;
-    for (int k = 0; k < D * f->n_node; k++) {
-        const double u = silt_mesh_velocity(f, k);
-        f->x_mid[k] = x[k] + 0.5 * dt * u;
-        if (D == 3)
-            end[k] = x[k] + dt * u;
-    }
+    for (int k = 0; k < D * f->n_node; k++)
+        f->x_mid[k] = x[k] + 0.5 * dt * silt_mesh_velocity(f, k);
     for (int i = 0; i < f->n_node; i++)
         f->mass[i] = f->volume[i] = 0;
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        double c[4][3], first[4][3], flux[4][3];
+        double c[4][3], flux[4][3];
         gather(D, mesh, x, cell, c);
-        const double start = shape(D, c, first);
+        const double start = shape(D, c, flux);
         double volume = start, inverse = bounded_inverse(D, c, start);
-        memcpy(flux, first, sizeof flux);
         if (dt > 0) {
-            double middle[4][3];
-            gather(D, mesh, f->x_mid, cell, c);
-            const double moved = shape(D, c, middle);
-            if (moved > FLAT_STEP * start) {
+            double m[4][3], middle[4][3];
+            gather(D, mesh, f->x_mid, cell, m);
+            const double moved = shape(D, m, middle);
+            const bool whole = moved > FLAT_STEP * start;
+            if (whole) {
                 volume = moved;
-                inverse = bounded_inverse(D, c, moved);
+                inverse = bounded_inverse(D, m, moved);
+            }
+            if (whole || D == 3)
                 memcpy(flux, middle, sizeof flux);
-                if (D == 3) { // fluxes are quadratic in time: Simpson's rule is exact
-                    double last[4][3];
-                    gather(D, mesh, end, cell, c);
-                    shape(D, c, last);
-                    for (int a = 0; a < 4; a++)
-                        for (int d = 0; d < 3; d++)
-                            flux[a][d] = (first[a][d] + 4 * middle[a][d] + last[a][d]) / 6;
-                }
+            if (D == 3) { // fluxes are quadratic in time: their mean over the step is that in the middle and a third of this
+                double way[4][3], more[4][3];
+                for (int a = 0; a < 4; a++)
+                    for (int d = 0; d < 3; d++)
+                        way[a][d] = m[a][d] - c[a][d];
+                shape(D, way, more);
+                for (int a = 0; a < 4; a++)
+                    for (int d = 0; d < 3; d++)
+                        flux[a][d] += more[a][d] / 3;
             }
         }
         f->cell_volume[e] = volume;

@@ -1,11 +1,12 @@
 // books what a rebuild did to the volume, where it did it: mesh and debts together hold what they held
 #include "remesh.h"
 
-// Cells that are gone and cells that came are joined into groups across facets: a group fills one hollow of the mesh that
-// stayed, so that exchanges of cells within the water lose nothing. Cells around a node that left, came back or was moved
-// (put on a wall, a body) are one group with the change that the moved node made to cells that stayed.
+// Cells that are gone and cells that came are joined into groups across facets: a group fills one hollow of the mesh
+// that stayed, so that exchanges of cells within the water lose nothing. Cells around a node that left, came back or
+// was moved (put on a wall, a body) are one group with the change that the moved node made to cells that stayed.
 typedef struct change {
-    int cell, generation; // 0: a cell of the memory that is gone, 1: a new cell, 2: bed that took its place, 3: a cell that stayed
+    int cell, generation; // 0: a cell of the memory that is gone, 1: a new cell, 2: bed that took its place, 3: a cell
+                          // that stayed
     int node;             // 3: the node that was moved
     double volume;        // m3, 0 to 2: of the cell; 3: what the move of the node made of it
 } change;
@@ -26,7 +27,9 @@ typedef struct book {
 } book;
 
 static const int *change_nodes(const book *b, const change *c) {
-    return c->generation == 0 ? b->memory->cell[c->cell] : c->generation == 2 ? b->memory->taken[c->cell] : b->draft->mesh->cell[c->cell];
+    return c->generation == 0   ? b->memory->cell[c->cell]
+           : c->generation == 2 ? b->memory->taken[c->cell]
+                                : b->draft->mesh->cell[c->cell];
 }
 
 static void book_item(book *b, int cell, int generation, int node, double volume) {
@@ -48,7 +51,8 @@ typedef struct facet_item {
     int side;     // 0 or 1: on which side of the facet the cell lies; 2 more when the cell is new
 } facet_item;
 
-// the changed cells of one facet: c[0] gone on its one side, c[1] on the other, c[2] come on the one, c[3] on the other; -1
+// the changed cells of one facet: c[0] gone on its one side, c[1] on the other, c[2] come on the one, c[3] on the
+// other; -1
 static void facet_join(book *b, const int c[4]) {
     // the same side of a facet before and after
     for (int side = 0; side < 2; side++)
@@ -70,7 +74,8 @@ static void book_facets(book *b) {
     facet_item *item = silt_alloc((size_t)b->n_changed * (size_t)(b->dim + 1) + 1, sizeof *item);
     for (int pass = 0; pass < 2; pass++) {
         for (int k = 0; k < b->n_changed; k++) {
-            // without its first node the cell's rising nodes are a facet on one side, without its second on the other, ...
+            // without its first node the cell's rising nodes are a facet on one side, without its second on the other,
+            // ...
             uint32_t node[4];
             const int turned = silt_cell_sort(change_nodes(b, &b->item[k]), node), lowest = (int)(node[0] >> 2);
             if (pass == 0) {
@@ -80,7 +85,8 @@ static void book_facets(book *b) {
             }
             const int new = b->item[k].generation ? 2 : 0;
             for (int a = 0; a <= b->dim; a++) {
-                const int second = (int)(node[a < 2 ? 2 : 1] >> 2), third = b->dim == 2 ? -1 : (int)(node[a < 3 ? 3 : 2] >> 2);
+                const int second = (int)(node[a < 2 ? 2 : 1] >> 2),
+                          third = b->dim == 2 ? -1 : (int)(node[a < 3 ? 3 : 2] >> 2);
                 item[--start[a ? lowest : (int)(node[1] >> 2)]] =
                     (facet_item){{second, third}, k, new + (turned ^ (a & 1))};
             }
@@ -148,9 +154,9 @@ static void volume_slope(int dim, const double *c, int a, double slope[3]) {
     }
 }
 
-// A cell that stayed changed by `all`: what the move of each of its nodes made. Along the straight way from the old corners to
-// the new ones the volume is a polynomial of third degree, its slope one of second: Simpson's rule is exact. What no move
-// explains (rounding, bed that became water) stays with the cell.
+// A cell that stayed changed by `all`: what the move of each of its nodes made. Along the straight way from the old
+// corners to the new ones the volume is a polynomial of third degree, its slope one of second: Simpson's rule is exact.
+// What no move explains (rounding, bed that became water) stays with the cell.
 static void book_stretched(book *b, int e, double all) {
     const silt_mesh *mesh = b->draft->mesh;
     const int *cell = mesh->cell[e], dim = b->dim;
@@ -210,8 +216,9 @@ static int heir_of(const book *b, const double *x) {
     return heir;
 }
 
-// What the group lost goes to its wet nodes; without any to its flying ones, or to the nearest wet node of all. A node that
-// lost all its cells takes its share along. @return number of entries, one more when there was an heir from outside
+// What the group lost goes to its wet nodes; without any to its flying ones, or to the nearest wet node of all. A node
+// that lost all its cells takes its share along. @return number of entries, one more when there was an heir from
+// outside
 static int group_settle(book *b, entry *list, int n, double sum) {
     silt_nodes *nodes = b->nodes;
     const silt_memory *memory = b->memory;
@@ -270,7 +277,8 @@ static void book_groups(book *b) {
     const int n = b->nodes->count, n_corner = b->dim + 1, n_element = b->n_changed + n;
     silt_memory *memory = b->memory;
     // items and lone nodes by group
-    int *start = silt_alloc((size_t)n_element + 2, sizeof *start), *order = silt_alloc((size_t)b->n_item + (size_t)n + 1, sizeof *order);
+    int *start = silt_alloc((size_t)n_element + 2, sizeof *start),
+        *order = silt_alloc((size_t)b->n_item + (size_t)n + 1, sizeof *order);
     for (int pass = 0; pass < 2; pass++) {
         for (int k = b->n_item + n - 1; k >= 0; k--) {
             // a node's debt must find its group also where it has no changed cell

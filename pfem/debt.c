@@ -1,7 +1,6 @@
 // volume that remeshing took or gave and that is owed; water that cannot keep its volume
 #include "fluid.h"
 
-#define DEBT_CELLS 7  // without gravity: cells that the fastest water crosses while a debt is paid
 #define DEBT_CAP 0.3 // largest share of a node's volume that its debt may ask for
 
 static double gravity_size(const silt_scene *scene) {
@@ -39,20 +38,7 @@ void silt_debts_ask(silt_fluid *f, const silt_step *s) {
     if (!s->scene->fluid.volume_control)
         return;
     const double g = gravity_size(s->scene);
-    // never faster than water falls or crosses a few cells, however short the step
-    double fastest = 0, mean[3] = {0}, mass = 0;
-    for (int i = 0; i < f->n_node; i++) {
-        mass += f->mass[i];
-        for (int d = 0; d < f->dim; d++)
-            mean[d] += f->mass[i] * f->w[f->dim * i + d];
-    }
-    for (int i = 0; i < f->n_node; i++) {
-        double own[3];
-        for (int d = 0; d < f->dim; d++)
-            own[d] = mesh->wet[i] && mass > 0 ? f->w[f->dim * i + d] - mean[d] / mass : 0;
-        fastest = silt_max(fastest, silt_length(f->dim, own));
-    }
-    const double h = s->scene->fluid.size, least = g > 0 ? 2 * sqrt(h / g) : fastest > 0 ? DEBT_CELLS * h / fastest : 0;
+    const double least = g > 0 ? 2 * sqrt(s->scene->fluid.size / g) : 0;
     const double time = silt_max(s->scene->fluid.volume_steps * s->dt, least);
     double *change = f->residual;
     for (int sweep = 0; sweep < 4; sweep++) {
@@ -119,6 +105,23 @@ void silt_mobile_find(silt_fluid *f, const silt_mesh *mesh, double *p) {
     free(held);
 }
 
+// a piece of water none of whose nodes keeps its volume any more has no pressure to take: it runs as drops do
+static void loose_pieces(const silt_fluid *f, const silt_mesh *mesh, double *p) {
+    int *parent = silt_alloc((size_t)f->n_node + 1, sizeof *parent);
+    uint8_t *kept = silt_alloc((size_t)f->n_node + 1, 1);
+    for (int i = 0; i < f->n_node; i++)
+        parent[i] = i;
+    for (int e = 0; e < f->n_cell; e++)
+        silt_group_join(parent, mesh->cell[e]);
+    for (int i = 0; i < f->n_node; i++)
+        kept[silt_group_find(parent, i)] |= f->mobile[i] == 1;
+    for (int i = 0; i < f->n_node; i++)
+        if (mesh->wet[i] && !kept[silt_group_find(parent, i)])
+            p[i] = 0;
+    free(parent);
+    free(kept);
+}
+
 // Water hemmed in between bed, walls, bodies and grains may have no velocity that keeps its volume, and then its pressure
 // means nothing: such a node takes that of its surroundings, and what it gains is owed; at last also a node that is free,
 // a crumpled drop, when it is little.
@@ -144,5 +147,7 @@ bool silt_pockets_relent(silt_fluid *f, const silt_mesh *mesh, silt_pocket which
         p[i] = count ? sum / count : 0;
         any = true;
     }
+    if (any)
+        loose_pieces(f, mesh, p);
     return any;
 }

@@ -54,7 +54,8 @@ int silt_delaunay_3d(int n, const double *x, int **tetrahedron, int *n_tetrahedr
         cloud.reserve(static_cast<size_t>(n));
         for (int i = 0; i < n; i++)
             cloud.emplace_back(Kernel::Point_3(x[3 * i], x[3 * i + 1], x[3 * i + 2]), i);
-        // points are put in along a space-filling curve; ties are broken by the order of the coordinates, not of insertion
+        // points are put in along a space-filling curve; ties are broken by the order of the coordinates, not of
+        // insertion
         Delaunay3 mesh(cloud.begin(), cloud.end());
         const size_t count = mesh.dimension() == 3 ? mesh.number_of_finite_cells() : 0;
         int *out = static_cast<int *>(std::malloc((count ? count : 1) * 4 * sizeof(int)));

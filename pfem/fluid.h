@@ -1,7 +1,7 @@
 /** @file fluid.h
  * One step of the water: momentum, pressure, correction on the midpoint mesh (docs/method.md, "Fluid"), in 2-D and 3-D.
  * Rooms: fluid.c the step, hold.c what surroundings hold, assemble.c integrals over cells, momentum.c the viscous system,
- * pressure.c the pressure system, debt.c volume that is owed and water that cannot keep its volume.
+ * pressure.c the pressure system, stiff.c both at once where viscosity is stiff, debt.c volume that is owed and water that cannot keep its volume.
  */
 #ifndef SILT_FLUID_H
 #define SILT_FLUID_H
@@ -10,6 +10,7 @@
 #include "viscosity.h"
 
 typedef struct silt_pressure silt_pressure; // the pressure matrix and its factor, pressure.c
+typedef struct silt_stiff silt_stiff;       // factors of momentum and continuity where viscosity is stiff, stiff.c
 typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
 
 /** what a step sees */
@@ -54,7 +55,9 @@ typedef struct silt_fluid {
     double *cg[3];        // owned, dim per node, momentum solver
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned
+    silt_stiff *stiff;    // owned
     silt_mix *mix;        // owned
+    double theta;         // implicitness of the step: fluid.theta, more where viscosity is stiff
     silt_depth depth;     // owned, distances to walls and surface; empty where viscosity is the same everywhere
     silt_wall_law law;    // owned
     silt_viscosity_report viscosity; // of the last step
@@ -153,5 +156,21 @@ silt_status silt_pressure_solve(silt_pressure *pressure, silt_fluid *fluid, cons
 silt_status silt_pressure_solve_stiff(silt_pressure *pressure, const double *right, double *increment, silt_error *err);
 /** forgets factors, so that a resumed run and one that went on hold the same */
 void silt_pressure_forget(silt_pressure *pressure);
+
+
+// stiff.c -------------------------------------------------------------------------------------------------
+/** Assembles and factors momentum and continuity of the present geometry and viscosity, 2-D. Makes *stiff at first. */
+silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *fluid, const silt_step *step, silt_error *err);
+/** whether there are factors of the present step */
+bool silt_stiff_ready(const silt_stiff *stiff);
+/** the step is over */
+void silt_stiff_end(silt_stiff *stiff);
+/** out = (inertia + K)^-1 right on the free components */
+silt_status silt_stiff_momentum(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *out, silt_error *err);
+/** velocity and pressure that together mend continuity: v += dv, (inertia + K) dv = G increment, G^T dv + L increment = right */
+silt_status silt_stiff_correct(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *increment, double *v,
+                               silt_error *err);
+void silt_stiff_forget(silt_stiff *stiff);
+void silt_stiff_free(silt_stiff **stiff);
 
 #endif

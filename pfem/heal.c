@@ -1,12 +1,13 @@
-// slivers: four nodes nearly in a plane, which the Delaunay criterion lets pass, taken out by local exchanges of tetrahedra
+// slivers: four nodes nearly in a plane, which the Delaunay criterion lets pass, taken out by local exchanges of
+// tetrahedra
 #include "remesh.h"
 
-#define HEAL_BELOW 0.12 // cells with a smaller height than this times h are tried
-#define HEAL_RING 8     // an edge with more cells around it is left alone
+#define HEAL_BELOW  0.12 // cells with a smaller height than this times h are tried
+#define HEAL_RING   8    // an edge with more cells around it is left alone
 #define HEAL_PASSES 6
-#define HEAL_CELLS (2 * HEAL_RING)
-#define HEAL_STAR 128   // most cells around a node that gives way
-#define HEAL_STEP 0.02  // by which it gives way, times h, and twice and three times that
+#define HEAL_CELLS  (2 * HEAL_RING)
+#define HEAL_STAR   128  // most cells around a node that gives way
+#define HEAL_STEP   0.02 // by which it gives way, times h, and twice and three times that
 
 typedef struct healer {
     silt_draft *draft;
@@ -179,7 +180,8 @@ static void try_edge(const healer *s, int e, const int corner[4], remedy *best) 
     }
 }
 
-// takes out the facet opposite node a: three cells around the line between the two nodes that faced each other across it
+// takes out the facet opposite node a: three cells around the line between the two nodes that faced each other across
+// it
 static void try_facet(const healer *s, int e, int a, remedy *best) {
     const silt_mesh *mesh = s->mesh;
     const int f = mesh->across[e][a];
@@ -213,7 +215,8 @@ static void try_facet(const healer *s, int e, int a, remedy *best) {
     best->old[1] = f;
     best->n_new = 3;
     for (int k = 0; k < 3; k++) {
-        memcpy(best->fresh[k], (const int[4]){facet[k], facet[(k + 1) % 3], p.node[0], p.node[1]}, sizeof best->fresh[k]);
+        memcpy(best->fresh[k], (const int[4]){facet[k], facet[(k + 1) % 3], p.node[0], p.node[1]},
+               sizeof best->fresh[k]);
         best->quality[k] = quality[k];
     }
 }
@@ -309,7 +312,8 @@ typedef struct patient {
 
 static int patient_worse(const void *a, const void *b) {
     const patient *p = a, *q = b;
-    return p->quality != q->quality ? (p->quality > q->quality) - (p->quality < q->quality) : (p->cell > q->cell) - (p->cell < q->cell);
+    return p->quality != q->quality ? (p->quality > q->quality) - (p->quality < q->quality)
+                                    : (p->cell > q->cell) - (p->cell < q->cell);
 }
 
 static void heal_cell(healer *s, int e) {
@@ -373,7 +377,8 @@ static void give_way(healer *s, double *x, int e) {
         for (int d = 0; d < 3; d++) {
             const int p = (d + 1) % 3, q = (d + 2) % 3;
             const double *o = corner + 3 * side[0], *u = corner + 3 * side[1], *v = corner + 3 * side[2];
-            normal[d] = (v[p] - o[p]) * (u[q] - o[q]) - (v[q] - o[q]) * (u[p] - o[p]); // away from the facet, into the cell
+            normal[d] =
+                (v[p] - o[p]) * (u[q] - o[q]) - (v[q] - o[q]) * (u[p] - o[p]); // away from the facet, into the cell
             length += normal[d] * normal[d];
         }
         memcpy(home, x + 3 * i, sizeof home);

@@ -16,7 +16,7 @@ struct silt_history {
 };
 
 // a ledger column and the part of the scene that it belongs to
-typedef enum { PART_FLUID, PART_BED, PART_GRAINS, PART_FLOW } history_part;
+typedef enum { PART_FLUID, PART_LAW, PART_BED, PART_GRAINS, PART_FLOW } history_part;
 typedef struct history_column {
     const char *name;
     history_part part;
@@ -45,7 +45,7 @@ static const history_column history_ledger[] = {
     {"volume_refined", PART_FLUID, offsetof(silt_ledger, volume_refined), false},
     {"volume_given", PART_FLUID, offsetof(silt_ledger, volume_given), false},
     {"volume_owed", PART_FLUID, offsetof(silt_ledger, volume_owed), false},
-    {"y_plus", PART_FLUID, offsetof(silt_ledger, y_plus), false},
+    {"y_plus", PART_LAW, offsetof(silt_ledger, y_plus), false},
     {"angular_momentum_x", PART_FLUID, offsetof(silt_ledger, angular_momentum[0]), false},
     {"angular_momentum_y", PART_FLUID, offsetof(silt_ledger, angular_momentum[1]), false},
     {"angular_momentum_z", PART_FLUID, offsetof(silt_ledger, angular_momentum[2]), false},
@@ -86,6 +86,12 @@ static bool history_has(const silt_scene *scene, history_part part) {
     switch (part) {
     case PART_FLUID:
         return scene->fluid.on;
+    case PART_LAW: {
+        bool law = scene->bed.on && scene->bed.condition == WALL_LAW;
+        for (int k = 0; k < scene->n_wall; k++)
+            law |= scene->wall[k].condition == WALL_LAW;
+        return scene->fluid.on && law;
+    }
     case PART_BED:
         return scene->bed.on;
     case PART_GRAINS:

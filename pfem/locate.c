@@ -7,7 +7,8 @@ static int bin_index(const silt_locator *locator, int d, double x) {
 }
 
 // bins that a cell's box touches along an axis; on a periodic one they may run past the end
-static void cell_bins(const silt_locator *locator, const silt_mesh *mesh, const double *x, int e, int first[3], int last[3]) {
+static void cell_bins(const silt_locator *locator, const silt_mesh *mesh, const double *x, int e, int first[3],
+                      int last[3]) {
     const int dim = mesh->dim == 3 ? 3 : 2;
     double corner[12];
     silt_cell_corners(mesh, x, mesh->cell[e], corner);
@@ -52,7 +53,8 @@ void silt_locator_build(silt_locator *locator, const silt_mesh *mesh, const doub
 
     // bins of about one cell; coarser when the water is spread over a large empty box
     double size = 1.5 * h;
-    while ((hi[0] - lo[0]) / size * ((hi[1] - lo[1]) / size) * (dim == 3 ? (hi[2] - lo[2]) / size : 1) > 4.0 * mesh->n_cell + 64)
+    while ((hi[0] - lo[0]) / size * ((hi[1] - lo[1]) / size) * (dim == 3 ? (hi[2] - lo[2]) / size : 1) >
+           4.0 * mesh->n_cell + 64)
         size *= 1.5;
     for (int d = 0; d < 3; d++) {
         const bool periodic = mesh->period[d] > 0 && hi[d] > lo[d];
@@ -123,7 +125,8 @@ static bool weights_3d(const double *c, const double *point, double *w) {
     return true;
 }
 
-int silt_locate(const silt_locator *locator, const silt_mesh *mesh, const double *x, const double *point, double *weight) {
+int silt_locate(const silt_locator *locator, const silt_mesh *mesh, const double *x, const double *point,
+                double *weight) {
     if (!locator->start)
         return -1;
     const int dim = mesh->dim == 3 ? 3 : 2, *n = locator->n;

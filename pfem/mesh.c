@@ -232,7 +232,8 @@ void silt_mesh_connect_known(silt_mesh *mesh, const silt_nodes *nodes) {
     }
     mesh->neighbour_start[n] = filled;
 
-    // a facet that only one cell has is boundary; in the order of their first nodes, in 3-D the lowest, then of the cells
+    // a facet that only one cell has is boundary; in the order of their first nodes, in 3-D the lowest, then of the
+    // cells
     int *place = seen;
     memset(place, 0, (size_t)(n + 1) * sizeof *place);
     for (int pass = 0; pass < 2; pass++) {
@@ -305,7 +306,9 @@ static double tetrahedron_volume(const double *a, const double *b, const double 
         v[k] = c[k] - a[k];
         w[k] = d[k] - a[k];
     }
-    return (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6;
+    return (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) +
+            u[2] * (v[0] * w[1] - v[1] * w[0])) /
+           6;
 }
 
 double silt_simplex_volume(int dim, const double *c) {
@@ -352,7 +355,8 @@ silt_cell_shape silt_cell_measure(int dim, const double *corner) {
         const double ab = hypot(b[0] - a[0], b[1] - a[1]), bc = hypot(c[0] - b[0], c[1] - b[1]);
         const double ca = hypot(a[0] - c[0], a[1] - c[1]);
         const double longest = silt_max(ab, silt_max(bc, ca));
-        return (silt_cell_shape){area, area > 0 ? ab * bc * ca / (4 * area) : HUGE_VAL, longest > 0 ? 2 * area / longest : 0};
+        return (silt_cell_shape){area, area > 0 ? ab * bc * ca / (4 * area) : HUGE_VAL,
+                                 longest > 0 ? 2 * area / longest : 0};
     }
     double u[3], v[3], w[3], vw[3], wu[3], uv[3], opposite[3], centre[3];
     for (int d = 0; d < 3; d++) {

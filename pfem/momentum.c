@@ -1,4 +1,4 @@
-// the viscous momentum system, by conjugate gradients
+// the viscous momentum system, by conjugate gradients; where viscosity is stiff preconditioned by the factor of its first geometry
 #include "fluid.h"
 
 #define MOMENTUM_LIMIT 3000
@@ -14,6 +14,7 @@ silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const doub
         for (int d = 0; d < D; d++)
             r[D * i + d] = right[D * i + d] - f->inertia[i] * v[D * i + d];
     silt_assemble_viscous(f, mesh, v, -1, r);
+    const bool factored = silt_stiff_ready(f->stiff);
     double rz = 0, scale = 0, whole = 0;
     for (int i = 0; i < n; i++) {
         double loose[3];
@@ -31,7 +32,15 @@ silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const doub
     // what walls hold is no measure of what is solved for, only of its rounding
     const double target = silt_max(1e-24 * scale, 1e-30 * whole);
     f->momentum_iterations = 0;
-    while (rz > target) {
+    double size = rz; // what is left of the residual
+    if (factored && size > target) {
+        SILT_TRY(silt_stiff_momentum(f->stiff, f, r, s, err));
+        rz = 0;
+        for (int k = 0; k < D * n; k++)
+            rz += r[k] * s[k];
+    }
+    double *z = factored ? f->scratch : NULL;
+    while (size > target) {
         if (++f->momentum_iterations > MOMENTUM_LIMIT)
             return silt_fail(err, SILT_FAILED, "the momentum system did not converge in %d iterations (%d nodes)", MOMENTUM_LIMIT, n);
         for (int i = 0; i < n; i++)
@@ -53,10 +62,17 @@ silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const doub
                 r[k] -= alpha * as[k];
                 fresh += r[k] * r[k] / diagonal[i];
             }
+        size = fresh;
+        if (factored && size > target) {
+            SILT_TRY(silt_stiff_momentum(f->stiff, f, r, z, err));
+            fresh = 0;
+            for (int k = 0; k < D * n; k++)
+                fresh += r[k] * z[k];
+        }
         const double beta = fresh / rz;
         for (int i = 0; i < n; i++)
             for (int d = 0; d < D; d++)
-                s[D * i + d] = r[D * i + d] / diagonal[i] + beta * s[D * i + d];
+                s[D * i + d] = (factored ? z[D * i + d] : r[D * i + d] / diagonal[i]) + beta * s[D * i + d];
         rz = fresh;
         if (!isfinite(rz))
             return silt_fail(err, SILT_FAILED, "the momentum system gave numbers that are not finite");

@@ -101,7 +101,7 @@ typedef struct silt_summary {
     double phase[PHASE_COUNT];    // s, summed
     double node_steps;            // sum over steps of nodes
     double worst_volume_error, worst_sediment_error, worst_momentum_error;
-    int64_t steps, retries, iterations;
+    int64_t steps, retries, iterations, most_iterations;
 } silt_summary;
 silt_status silt_summary_write(const char *out, const silt_view *view, const silt_summary *summary, silt_error *err);
 void silt_progress(const silt_view *view, double until, double seconds, bool last); // one terminal line on stderr

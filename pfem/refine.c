@@ -8,6 +8,7 @@
 #define REFINE_SURFACE 0.35 // this: the surface's shape hangs on them; up to the former where the surface is so flat that
 #define REFINE_SHAPE 0.01   // less than this times h^dim comes or goes with the node
 #define REFINE_FLAT 0.25    // a node nearer to a wall than this times h is pressed out
+#define REFINE_UNDER 0.1    // in space a node from within nearer than this times h to the free surface: slivers would follow, and go
 #define REFINE_CREASE 1.5   // edges along creases that are longer than this times h get nodes
 #define REFINE_ROOM 0.6     // but no node comes inside nearer than this times h to another
 #define REFINE_MEET 0.15    // on the boundary what is less dear may be as near as this times h: it leaves
@@ -16,6 +17,10 @@
 // h in strong strain, and in space the diagonals of a lattice's faces would be split); room for a node on the boundary, where
 // an edge that is not split tears
 static const double refine_taut[4] = {0, 0, 1.5, 1.7}, refine_slack[4] = {0, 0, 1.6, 1.7}, refine_rim[4] = {0, 0, 0.36, 0.5};
+// Water on a plane wall runs out in a thin wedge, which has nodes down to this thickness times h: with fewer the wedge ends
+// in a step, water falls into it, and what is cut off and paid back there keeps the shore in motion for ever. 2-D only.
+#define REFINE_WEDGE 0.1
+#define REFINE_FRESH 0.15   // and gets new ones down to this
 // cells at the surface that are smaller than this times h^dim are films
 static const double refine_film[4] = {0, 0, 0.25, 0.068};
 
@@ -214,6 +219,15 @@ static double refine_stretch(const refinement *r, int goes, int stays) {
     return most;
 }
 
+static bool refine_on_wall(const refinement *r, int i) {
+    return r->nodes->wall[i][0] >= 0 || r->nodes->kind[i] == NODE_CORNER;
+}
+
+// true when the edge spans a film of water from the wall to the surface
+static bool refine_spans(const refinement *r, int i, int j) {
+    return r->dim == 2 && refine_on_wall(r, i) != refine_on_wall(r, j) && r->mesh->surface[refine_on_wall(r, i) ? j : i];
+}
+
 static void refine_crowded(refinement *r) {
     const silt_mesh *mesh = r->mesh;
     const bool periodic = mesh->period[0] > 0 || mesh->period[1] > 0 || mesh->period[2] > 0;
@@ -233,7 +247,7 @@ static void refine_crowded(refinement *r) {
             const double ratio = refine_length(r, i, j) / h;
             if (ratio >= REFINE_CREASE)
                 r->long_edge[i] = r->long_edge[j] = 1;
-            if (ratio < REFINE_CROWDED && !r->locked[i] && !r->locked[j])
+            if (ratio < REFINE_CROWDED && !r->locked[i] && !r->locked[j] && (ratio < REFINE_WEDGE || !refine_spans(r, i, j)))
                 refine_propose(r, -ratio, i, j, -1);
         }
     }
@@ -291,11 +305,12 @@ static double refine_facet_measure(const refinement *r, const int *facet) {
     return 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
 }
 
-// inner nodes pressed against a wall, the bed or a body
+// inner nodes pressed against a wall, the bed or a body, in space against the free surface
 static void refine_flat(refinement *r) {
     r->n = 0;
     for (int k = 0; k < r->mesh->n_facet; k++) {
-        if (r->mesh->facet_kind[k] == FACET_FREE || r->mesh->facet_kind[k] == FACET_INLET)
+        const bool surface = r->mesh->facet_kind[k] == FACET_FREE;
+        if ((surface && r->dim == 2) || r->mesh->facet_kind[k] == FACET_INLET)
             continue;
         int apex;
         const int e = refine_behind(r, k, &apex);
@@ -304,7 +319,7 @@ static void refine_flat(refinement *r) {
         const int *facet = r->mesh->facet[k];
         const double height = r->dim * cell_measure(r->mesh, r->nodes->x, r->mesh->cell[e]) / refine_facet_measure(r, facet);
         const double ratio = height / silt_node_h(r->nodes, apex, r->h);
-        if (ratio < REFINE_FLAT)
+        if (ratio < (surface ? REFINE_UNDER : REFINE_FLAT))
             refine_propose(r, -ratio, apex, -1, e);
     }
     refine_sort(r);
@@ -396,13 +411,16 @@ static void refine_onto(const refinement *r, int n, int wall[3], double *x) {
 }
 
 // True when no node, new ones included, is nearer to x than room; those less dear than rank may be as near as REFINE_MEET and
-// leave afterwards. a and b: ends of the edge that x lies on, h: size there
-static bool refine_has_room(const refinement *r, int a, int b, const double *x, double room, int rank, double h) {
+// leave afterwards, those across a wedge nearer. a and b: ends of the edge that x lies on, h: size there
+static bool refine_has_room(const refinement *r, int a, int b, const double *x, double room, int rank, double h, bool wedge) {
     double d[3];
+    const bool on = refine_on_wall(r, a);
     for (int end = 0; end < 2; end++) {
         const int i = end ? b : a;
         for (int k = r->mesh->neighbour_start[i]; k < r->mesh->neighbour_start[i + 1]; k++) {
             const int j = r->mesh->neighbour[k];
+            if (wedge && refine_on_wall(r, j) != on)
+                continue;
             if (j != a && j != b && !r->memory->dead[j] &&
                 refine_apart(r, j, x, d) < (refine_rank(r, j) < rank ? REFINE_MEET * h : room))
                 return false;
@@ -412,6 +430,13 @@ static bool refine_has_room(const refinement *r, int a, int b, const double *x, 
         }
     }
     return true;
+}
+
+// true for an edge along a wedge of water on a wall: of the wall's side or of the surface
+static bool refine_along_wedge(const refinement *r, int a, int b) {
+    int wall[3];
+    const bool both = r->mesh->surface[a] && r->mesh->surface[b];
+    return r->dim == 2 && (both || refine_walls(r, a, b, wall) > 0);
 }
 
 static void refine_insert(refinement *r, int a, int b, double share, bool closed, const int *around, int n_around) {
@@ -427,9 +452,12 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
     if (n_wall)
         refine_onto(r, n_wall, wall, x);
     const double h = refine_h(r, a, b);
-    const bool surface = !closed && r->mesh->surface[a] && r->mesh->surface[b];
+    const bool surface = !closed && r->mesh->surface[a] && r->mesh->surface[b], wedge = !closed && refine_along_wedge(r, a, b);
     const int rank = (n_wall >= 2 ? 4 : n_wall) + (surface ? 2 : 0);
-    if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : refine_rim[dim]) * h, rank, h))
+    int element;
+    if (wedge && !n_wall && r->walls && silt_walls_distance(r->walls, x, &element) < REFINE_FRESH * h)
+        return;
+    if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : refine_rim[dim]) * h, rank, h, wedge))
         return;
     const int i = silt_nodes_add(nodes, NODE_FLUID, -1, x);
     for (int c = 0; c < dim; c++)
@@ -547,7 +575,11 @@ static void refine_stretched(refinement *r) {
             for (int s = 0; s <= dim; s++)
                 locked |= r->locked[r->mesh->cell[around[k]][s]];
         }
-        if (locked || film)
+        bool wedge = false;
+        for (int k = 0; k < n_around && film; k++)
+            for (int s = 0; s <= dim && dim == 2; s++)
+                wedge |= refine_on_wall(r, r->mesh->cell[around[k]][s]);
+        if (locked || (film && !(wedge && refine_along_wedge(r, a, b))))
             continue;
         const int pieces = (int)silt_clamp(floor(r->list[c].key + 0.5), 2, REFINE_PIECES);
         for (int m = 1; m < pieces; m++)

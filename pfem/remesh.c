@@ -1,6 +1,9 @@
-// decides what is water: Delaunay of the cloud, held against what was water a step ago; books the volume that this makes or loses
+// decides what is water: Delaunay of the cloud, held against what was water a step ago; books the volume that this
+// makes or loses
 #include "delaunay.h"
 #include "remesh.h"
+
+#define WEDGE_LONG 3.5 // times h: longest edge of a cell in a wedge on a wall
 
 static bool polygon_contains(int n, const double *p, double x, double y) {
     bool in = false;
@@ -84,7 +87,8 @@ void silt_cell_set_clear(silt_cell_set *set) {
 // ---- what a cell of the cloud is
 
 // nodes all on one patch of the walls make no cell where they lie flat on it
-static bool cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const silt_cell_shape *shape, double h) {
+static bool cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const silt_cell_shape *shape,
+                         double h) {
     return silt_mesh_share(mesh, nodes, mesh->dim + 1, cell) && shape->height < CELL_FLAT * h;
 }
 
@@ -104,8 +108,9 @@ static bool were_joined(const silt_mesh *mesh, int i, int j) {
     return false;
 }
 
-// How wide a gap a tetrahedron spans: a flat one may lie across a wide gap, so what counts is how far those of its corners are
-// apart that no edge of the water joins. `mesh` still has the adjacency of the old cells, `rim` the old boundary's facets.
+// How wide a gap a tetrahedron spans: a flat one may lie across a wide gap, so what counts is how far those of its
+// corners are apart that no edge of the water joins. `mesh` still has the adjacency of the old cells, `rim` the old
+// boundary's facets.
 static double gap_width(const silt_mesh *mesh, const silt_cell_set *rim, const int *cell, const double *corner,
                         const silt_cell_shape *shape) {
     int group[4] = {0, 1, 2, 3}, n_group = 4, size[4] = {0};
@@ -138,7 +143,8 @@ static double gap_width(const silt_mesh *mesh, const silt_cell_set *rim, const i
     }
     for (int a = 0; a < 4 && n_group == 2; a++)
         if (size[group[a]] == 1) { // a node before a facet
-            const double *p = corner + 3 * ((a + 1) % 4), *q = corner + 3 * ((a + 2) % 4), *r = corner + 3 * ((a + 3) % 4);
+            const double *p = corner + 3 * ((a + 1) % 4), *q = corner + 3 * ((a + 2) % 4),
+                         *r = corner + 3 * ((a + 3) % 4);
             double square = 0;
             for (int d = 0; d < 3; d++) {
                 const int m = (d + 1) % 3, n = (d + 2) % 3;
@@ -214,6 +220,48 @@ static bool cell_closes(const silt_mesh *mesh, const silt_nodes *nodes, const si
     return rate < 0;
 }
 
+// Radius of the smallest sphere around a tetrahedron. Between the surface and a node close under it lie cells as flat as caps,
+// whose circumscribed sphere may be large though no node is far from another: the water does not part there.
+static double enclosing_radius(const double *c) {
+    double best = HUGE_VAL;
+    for (int a = 0; a < 4; a++)
+        for (int b = 0; b < a; b++) {
+            double middle[3], square = 0;
+            bool in = true;
+            for (int d = 0; d < 3; d++) {
+                middle[d] = 0.5 * (c[3 * a + d] + c[3 * b + d]);
+                square += 0.25 * silt_square(c[3 * a + d] - c[3 * b + d]);
+            }
+            for (int k = 0; k < 4; k++) {
+                double off = 0;
+                for (int d = 0; d < 3; d++)
+                    off += silt_square(c[3 * k + d] - middle[d]);
+                in &= off <= square * (1 + 1e-12);
+            }
+            best = in ? silt_min(best, square) : best;
+        }
+    const bool edge = best < HUGE_VAL;
+    for (int a = 0; a < 4 && !edge; a++) {
+        const double *p = c + 3 * ((a + 1) % 4), *q = c + 3 * ((a + 2) % 4), *r = c + 3 * ((a + 3) % 4);
+        double u[3], v[3], uu = 0, vv = 0, uv = 0, off = 0, square = 0;
+        for (int d = 0; d < 3; d++) {
+            u[d] = q[d] - p[d];
+            v[d] = r[d] - p[d];
+            uu += u[d] * u[d];
+            vv += v[d] * v[d];
+            uv += u[d] * v[d];
+        }
+        const double under = 2 * (uu * vv - uv * uv);
+        for (int d = 0; d < 3; d++) {
+            const double centre = p[d] + (vv * (uu - uv) * u[d] + uu * (vv - uv) * v[d]) / under;
+            square += silt_square(p[d] - centre);
+            off += silt_square(c[3 * a + d] - centre);
+        }
+        best = off <= square ? silt_min(best, square) : best;
+    }
+    return sqrt(best);
+}
+
 // a cell's middle, within the period
 static void cell_centre(const silt_mesh *mesh, const silt_scene *scene, const double *corner, double centre[3]) {
     memset(centre, 0, 3 * sizeof *centre);
@@ -232,18 +280,19 @@ static bool cell_behind(const silt_mesh *mesh, const silt_nodes *nodes, const si
 
 // ---- the cloud's triangulation
 
-static void mesh_prepare(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier) {
+static void mesh_prepare(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene,
+                         const silt_barrier *barrier) {
     mesh->dim = silt_nodes_dim(nodes);
     mesh->walls = barrier->walls;
     mesh->period[0] = silt_max(0, scene->period[1] - scene->period[0]);
     mesh->period[1] = mesh->period[2] = 0;
 }
 
-// Cells of the live nodes. Where x is periodic, nodes nearer to its ends than `margin` are put beyond the other end too, and
-// of the copies of a cell the one is kept in which its lowest node is no copy. Coordinates are whole parts of the period
-// then: both copies have the same numbers but for a whole shift, so that ties are broken alike in both.
-static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const uint8_t *dead,
-                               double margin, int (**cells)[4], int *n_cell, silt_error *err) {
+// Cells of the live nodes. Where x is periodic, nodes nearer to its ends than `margin` are put beyond the other end
+// too, and of the copies of a cell the one is kept in which its lowest node is no copy. Coordinates are whole parts of
+// the period then: both copies have the same numbers but for a whole shift, so that ties are broken alike in both.
+static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene,
+                               const uint8_t *dead, double margin, int (**cells)[4], int *n_cell, silt_error *err) {
     const int n = nodes->count, dim = mesh->dim, n_corner = dim + 1;
     const double period = mesh->period[0], parts = 17592186044416.0, scale = period > 0 ? parts / period : 1; // 2^44
     int m = 0, room = 0, x_room = 0, *live = NULL;
@@ -315,8 +364,8 @@ static void draft_clear(silt_draft *draft) {
     free(draft->quality);
 }
 
-// Slivers that can be reached from the open go, those within the water stay (without them there would be holes of no volume).
-// Through walls nothing is reached.
+// Slivers that can be reached from the open go, those within the water stay (without them there would be holes of no
+// volume). Through walls nothing is reached.
 static void peel_slivers(silt_draft *draft, const silt_nodes *nodes, const uint8_t *sliver) {
     silt_mesh *mesh = draft->mesh;
     const int n = mesh->n_cell;
@@ -404,9 +453,9 @@ static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, c
 
 // ---- the first mesh
 
-silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
-                            silt_error *err) {
-    int (*cells)[4] = NULL, n_cells = 0, sliver_capacity = 0;
+silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene,
+                            const silt_barrier *barrier, silt_error *err) {
+    int(*cells)[4] = NULL, n_cells = 0, sliver_capacity = 0;
     uint8_t *sliver = NULL;
     mesh_prepare(mesh, nodes, scene, barrier);
     const int dim = mesh->dim;
@@ -447,10 +496,22 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
 
 // ---- the next mesh
 
+// A wedge of water that runs out on a plane wall has flat cells with large circumcircles: they count by their longest edge.
+static bool wedge_cell(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const double *corner, double h) {
+    bool on = false;
+    double longest = 0;
+    for (int a = 0; a < 3 && mesh->dim == 2; a++) {
+        const int b = (a + 1) % 3;
+        on |= nodes->wall[cell[a]][0] >= 0;
+        longest = silt_max(longest, hypot(corner[2 * a] - corner[2 * b], corner[2 * a + 1] - corner[2 * b + 1]));
+    }
+    return on && longest < WEDGE_LONG * h;
+}
+
 // Which cells of the cloud are water now. @return largest circumradius of these, m
-static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
-                           const silt_memory *memory, const silt_cell_set *old, int (*const cells)[4], int n_cells,
-                           uint8_t **sliver) {
+static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const silt_scene *scene,
+                           const silt_barrier *barrier, const silt_memory *memory, const silt_cell_set *old,
+                           int (*const cells)[4], int n_cells, uint8_t **sliver) {
     silt_mesh *mesh = draft->mesh;
     const int dim = mesh->dim;
     int sliver_capacity = 0;
@@ -474,7 +535,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
     silt_locator locator = {0};
     silt_locator_build(&locator, &gone, nodes->x, scene->fluid.size);
     // the old surface, as cells without a fourth node
-    int (*facet)[4] = silt_alloc((size_t)mesh->n_facet + 1, sizeof *facet);
+    int(*facet)[4] = silt_alloc((size_t)mesh->n_facet + 1, sizeof *facet);
     for (int k = 0; dim == 3 && k < mesh->n_facet; k++) {
         memcpy(facet[k], mesh->facet[k], sizeof mesh->facet[k]);
         facet[k][3] = -1;
@@ -495,7 +556,10 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
         const bool flat = dim == 3 && shape.height < CELL_FLAT * h;
         if ((dim == 2 && shape.volume < 1e-9 * h * h) || cell_on_wall(mesh, nodes, cell, &shape, h))
             continue;
-        bool keep = inner || flat || shape.radius < scene->fluid.alpha * h;
+        const double bound = scene->fluid.alpha * h;
+        const bool round = shape.radius < bound;
+        const bool wedge = !round && wedge_cell(mesh, nodes, cell, corner, h);
+        bool keep = inner || flat || wedge || round || (dim == 3 && enclosing_radius(corner) < bound);
         if (!keep)
             continue;
         cell_centre(mesh, scene, corner, centre);
@@ -508,7 +572,8 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
             }
             // in space a gap is between surfaces: a node from within has none to close
             keep = silt_locate(&locator, &gone, nodes->x, centre, weight) >= 0 ||
-                   (n_fluid > 0 && (dim == 2 || n_inner == 0) && cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
+                   (round && n_fluid > 0 && (dim == 2 || n_inner == 0) &&
+                    cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
         }
         if (!keep || cell_behind(mesh, nodes, barrier, cell, centre))
             continue;
@@ -551,7 +616,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
     uint8_t *sliver = NULL;
     // copies beyond a periodic border must reach as far as the largest empty sphere of the water
     for (double margin = 3 * scene->fluid.alpha * h;; margin *= 2) {
-        int (*cells)[4] = NULL, n_cells = 0;
+        int(*cells)[4] = NULL, n_cells = 0;
         const silt_status status = cloud_cells(mesh, nodes, scene, memory->dead, margin, &cells, &n_cells, err);
         if (status != SILT_OK) {
             silt_cell_set_clear(&old);

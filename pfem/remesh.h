@@ -32,7 +32,7 @@ typedef struct silt_cell_set {
     struct silt_cell_item {
         int node[3]; // the others, falling
         int cell;    // index
-    } *item;         // owned
+    } * item;        // owned
 } silt_cell_set;
 void silt_cell_set_create(silt_cell_set *set, int n_node, int n, const int (*cell)[4]);
 int silt_cell_set_find(const silt_cell_set *set, const int cell[4]); /**< index of the cell, or -1 */
@@ -60,12 +60,14 @@ typedef struct silt_draft {
     int before_capacity, quality_capacity;
 } silt_draft;
 
-/** Mends slivers of tetrahedra by removing edges and facets inside the water, the worst first; the water's volume and its
- * boundary stay. Where that does not help an inner node gives way by a few hundredths of h. Needs mesh->across and keeps it.
+/** Mends slivers of tetrahedra by removing edges and facets inside the water, the worst first; the water's volume and
+ * its boundary stay. Where that does not help an inner node gives way by a few hundredths of h. Needs mesh->across and
+ * keeps it.
  * @param x  the nodes' places (nodes->x); NULL: none gives way
  * @return how many cells flatter than CELL_FLAT are left */
 int silt_mesh_heal(silt_draft *draft, const silt_nodes *nodes, double *x, double size);
-/** Books what the rebuild did to the volume on the nodes' debt (and the exchange of every group in the memory, if asked).
+/** Books what the rebuild did to the volume on the nodes' debt (and the exchange of every group in the memory, if
+ * asked).
  * @param was_wet  one per node: had a cell before */
 void silt_book_volume(const silt_draft *draft, silt_nodes *nodes, silt_memory *memory, const silt_cell_set *old,
                       const uint8_t *was_wet, double size);

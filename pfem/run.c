@@ -5,6 +5,8 @@
 
 #include "run.h"
 
+#define PRESSURE_SLOPE 0.2 // largest share by which output carries the pressure on to the end of the step
+
 static volatile sig_atomic_t run_asked, run_stop; // a signal asked for a checkpoint; SIGTERM came
 
 static void on_signal(int number) {
@@ -22,11 +24,14 @@ static void phase_add(silt_run *run, silt_phase phase, double since) { run->phas
         phase_add(run, PHASE_##name, since_);                                                                          \
     } while (0)
 
-static void run_view(const silt_run *run, silt_view *view) {
+static void run_view(silt_run *run, silt_view *view) {
     const silt_scene *scene = run->scene;
     *view = (silt_view){.scene = scene, .ledger = &run->ledger, .step = run->step, .time = run->time, .dt = run->dt};
     if (scene->fluid.on) {
-        view->nodes = &run->nodes;
+        run->shown = run->nodes;
+        if (run->n_shown == run->nodes.count)
+            run->shown.p = run->p_shown;
+        view->nodes = &run->shown;
         view->mesh = &run->mesh;
         view->locator = &run->locator;
         view->solid = run->drag ? run->drag->solid : NULL;
@@ -40,129 +45,6 @@ static void run_view(const silt_run *run, silt_view *view) {
         view->bodies = silt_coupling_dem.bodies(run->coupling);
     }
     memcpy(view->wall, run->phase, sizeof view->wall);
-}
-
-// ---------------------------------------------------------------- the ledger
-
-static void ledger_take(silt_run *run) {
-    silt_ledger *ledger = &run->ledger;
-    const silt_nodes *nodes = &run->nodes;
-    const silt_scene *scene = run->scene;
-    const double rho = scene->fluid.density;
-    ledger->kinetic_energy = ledger->potential_energy = 0;
-    memset(ledger->momentum, 0, sizeof ledger->momentum);
-    ledger->mesh_volume = ledger->flying_volume = ledger->fluid_volume = 0;
-    const int D = silt_nodes_dim(nodes);
-    for (int e = 0; e < run->mesh.n_cell; e++) {
-        const int *cell = run->mesh.cell[e];
-        const double volume = silt_cell_volume(&run->mesh, nodes->x, e);
-        double water = volume, corner[12], height = 0;
-        silt_cell_corners(&run->mesh, nodes->x, cell, corner);
-        ledger->mesh_volume += volume;
-        for (int a = 0; a <= D; a++) {
-            if (run->drag)
-                water -= volume * run->drag->solid[cell[a]] / (D + 1);
-            for (int d = 0; d < D; d++)
-                height += corner[D * a + d] * scene->gravity[d] / (D + 1);
-        }
-        ledger->fluid_volume += water;
-        for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++) {
-                const double m = rho * water / (D + 1), v = nodes->v[D * cell[a] + d];
-                ledger->momentum[d] += m * v;
-                ledger->kinetic_energy += 0.5 * m * v * v;
-            }
-        ledger->potential_energy -= rho * water * height;
-    }
-    for (int i = 0; i < nodes->count; i++) {
-        if (run->mesh.wet[i])
-            continue;
-        const double volume = nodes->debt[i];
-        ledger->flying_volume += volume;
-        for (int d = 0; d < D; d++) {
-            ledger->momentum[d] += rho * volume * nodes->v[D * i + d];
-            ledger->kinetic_energy += 0.5 * rho * volume * silt_square(nodes->v[D * i + d]);
-            ledger->potential_energy -= rho * volume * nodes->x[D * i + d] * scene->gravity[d];
-        }
-    }
-    ledger->max_speed = 0;
-    for (int i = 0; i < nodes->count; i++)
-        if (run->mesh.wet[i] || nodes->kind[i] == NODE_FLUID)
-            ledger->max_speed = silt_max(ledger->max_speed, silt_length(D, nodes->v + D * i));
-    // parcels that wait are solid in the place where they were released
-    for (int k = 0; k < run->n_waiting && scene->fluid.on; k++)
-        ledger->fluid_volume -= run->waiting[k].mass / scene->bed.density;
-    ledger->fluid_volume += ledger->flying_volume;
-    ledger->fluid_mass = rho * ledger->fluid_volume;
-    ledger->volume_owed = 0;
-    for (int i = 0; i < nodes->count; i++)
-        ledger->volume_owed += run->mesh.wet[i] ? nodes->debt[i] : 0;
-    if (scene->fluid.on)
-        silt_water_moment(nodes, &run->mesh, run->drag ? run->drag->solid : NULL, rho, (const double[3]){0}, ledger->angular_momentum);
-    ledger->y_plus = run->fluid.law.n_point ? run->fluid.law.y_plus[1] : NAN;
-    ledger->bed_mass = run->bed.solid_mass;
-    ledger->pore_water_mass = run->bed.pore_water;
-    ledger->grain_count = 0;
-    ledger->grain_mass = 0;
-    memset(ledger->grain_velocity, 0, sizeof ledger->grain_velocity);
-    if (run->coupling) {
-        const silt_grain_state *grains = silt_coupling_dem.grains(run->coupling);
-        double moving = 0;
-        for (int k = 0; k < grains->count; k++) {
-            moving += grains->mass[k];
-            for (int d = 0; d < 3; d++)
-                ledger->grain_velocity[d] += grains->mass[k] * grains->v[3 * k + d];
-        }
-        for (int d = 0; d < 3 && moving > 0; d++)
-            ledger->grain_velocity[d] /= moving;
-        ledger->grain_count = grains->count + run->n_waiting;
-        // summed with care: the sediment must close to rounding
-        double carry = 0;
-        for (int k = 0; k < grains->count + run->n_waiting; k++) {
-            const double m = (k < grains->count ? grains->mass[k] : run->waiting[k - grains->count].mass) - carry;
-            const double sum = ledger->grain_mass + m;
-            carry = (sum - ledger->grain_mass) - m;
-            ledger->grain_mass = sum;
-        }
-        int64_t count;
-        const double left = ledger->left_mass;
-        silt_coupling_dem.left(run->coupling, &ledger->left_mass, &count);
-        // what left the mesh was water and what it carried
-        if (scene->bed.on)
-            ledger->outflow_mass -= rho * (ledger->left_mass - left) / scene->bed.density;
-    }
-    if (run->step == 0) {
-        ledger->initial_volume = ledger->fluid_volume;
-        ledger->initial_sediment = ledger->bed_mass + ledger->grain_mass;
-    }
-    const double base = ledger->initial_volume + ledger->inflow_mass / rho;
-    const double expected = base - ledger->outflow_mass / rho + ledger->pore_water_mass / rho;
-    ledger->volume_error = scene->fluid.on && base > 0 ? (ledger->fluid_volume - expected) / base : 0;
-    const double sediment = ledger->bed_mass + ledger->grain_mass + ledger->left_mass - ledger->initial_sediment;
-    ledger->sediment_error = ledger->initial_sediment > 0 ? sediment / ledger->initial_sediment : 0;
-
-    silt_summary *summary = &run->summary;
-    summary->worst_volume_error = silt_max(summary->worst_volume_error, fabs(ledger->volume_error));
-    summary->worst_sediment_error = silt_max(summary->worst_sediment_error, fabs(ledger->sediment_error));
-    summary->worst_momentum_error = silt_max(summary->worst_momentum_error, ledger->momentum_error);
-}
-
-// forces of the step that was solved: what the water's momentum leaves open, and whether what grains got the water lost
-static void ledger_balance(silt_run *run) {
-    silt_ledger *ledger = &run->ledger;
-    const silt_fluid *fluid = &run->fluid;
-    ledger->momentum_error = fluid->momentum_scale > 0 ? fluid->momentum_residual / fluid->momentum_scale : 0;
-    if (!run->coupling)
-        return;
-    silt_exchanged exchanged;
-    silt_coupling_dem.exchanged(run->coupling, &exchanged);
-    for (int d = 0; d < 2; d++) {
-        ledger->grain_water[d] = exchanged.grains[d];
-        ledger->grain_contact[d] = exchanged.contact[d];
-    }
-    const double open = hypot(fluid->from_grains[0] + exchanged.grains[0], fluid->from_grains[1] + exchanged.grains[1]);
-    if (exchanged.size > 0)
-        ledger->momentum_error = silt_max(ledger->momentum_error, open / exchanged.size);
 }
 
 // ---------------------------------------------------------------- steps in time
@@ -211,6 +93,12 @@ static double step_wanted(const silt_run *run) {
             least = silt_min(least, sqrt(h / g));
     }
     least = silt_min(least, walls_time(run));
+    // water at rest meets a belt or a lid
+    for (int k = 0; k < scene->n_wall; k++) {
+        const double speed = silt_length(3, scene->wall[k].velocity);
+        if (speed > 0)
+            least = silt_min(least, scene->fluid.size / speed);
+    }
     dt = silt_min(dt, scene->time.cfl * least);
     // it grows by half at most, and with grains by one of their steps at least
     if (run->dt > 0) {
@@ -290,6 +178,10 @@ static void water_keep(silt_run *run) {
     SILT_RESERVE(run->debt_old, run->debt_old_capacity, run->nodes.count + 1);
     memcpy(run->v_old, run->nodes.v, (size_t)D * n * sizeof(double));
     memcpy(run->debt_old, run->nodes.debt, n * sizeof(double));
+    SILT_RESERVE(run->p_old, run->p_old_capacity, run->nodes.count + 1);
+    memcpy(run->p_old, run->nodes.p, n * sizeof(double));
+    run->n_shown = -1;
+    run->n_old = run->nodes.count;
 }
 
 static void water_restore(silt_run *run) {
@@ -297,6 +189,7 @@ static void water_restore(silt_run *run) {
     memcpy(run->nodes.v, run->v_old, (size_t)silt_nodes_dim(&run->nodes) * n * sizeof(double));
     memcpy(run->nodes.debt, run->debt_old, n * sizeof(double));
     silt_pressure_forget(run->fluid.pressure);
+    silt_stiff_forget(run->fluid.stiff);
 }
 
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
@@ -406,6 +299,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     memset(run->phase, 0, sizeof run->phase);
     const double before = run->dt;
+    run->dt_old = run->step > 0 ? before : 0;
     const double wanted = step_wanted(run);
     if (step_sane(run, wanted, err) != SILT_OK) {
         run->whole = false; // not worth a checkpoint
@@ -457,16 +351,36 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         run->ledger.dissipation += run->fluid.dissipated;
         run->ledger.external_work += run->fluid.worked;
     }
-    ledger_balance(run);
+    silt_run_balance(run);
     clock_advance(run, n);
     return SILT_OK;
+}
+
+// The solver's pressure belongs to the middle of the step. Output shows that of its end: carried on from the step before, node by
+// node, by no more than a fifth of what it is (impacts are no slopes).
+static void pressure_show(silt_run *run) {
+    const silt_nodes *nodes = &run->nodes;
+    SILT_RESERVE(run->p_shown, run->p_shown_capacity, nodes->count + 1);
+    if (nodes->count)
+        memcpy(run->p_shown, nodes->p, (size_t)nodes->count * sizeof(double));
+    const bool known = run->dt_old > 0 && run->scene->fluid.theta < 0.75 && run->scene->fluid.shuffle == 0;
+    for (int i = 0; known && i < run->n_old; i++) {
+        const int now = run->map[i];
+        if (now < 0 || !run->mesh.wet[now] || run->p_old[i] == 0)
+            continue;
+        const double p = nodes->p[now], most = PRESSURE_SLOPE * silt_max(fabs(p), fabs(run->p_old[i]));
+        run->p_shown[now] += silt_clamp((p - run->p_old[i]) * run->dt / (run->dt + run->dt_old), -most, most);
+    }
+    run->n_shown = nodes->count;
 }
 
 // porosity at the new places, for the ledger and the frames
 static silt_status step_close(silt_run *run, silt_error *err) {
     if (run->coupling && run->scene->fluid.on)
         SILT_TRY(silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
-    ledger_take(run);
+    silt_run_ledger(run);
+    if (run->scene->fluid.on)
+        pressure_show(run);
     return SILT_OK;
 }
 
@@ -484,6 +398,8 @@ static silt_status step_output(silt_run *run, silt_error *err) {
         run->summary.phase[k] += run->phase[k];
     run->summary.node_steps += run->nodes.count;
     run->summary.iterations += run->fluid.iterations;
+    if (run->fluid.iterations > run->summary.most_iterations)
+        run->summary.most_iterations = run->fluid.iterations;
     run->summary.steps++;
     run->output_seconds = silt_seconds() - since;
     run->whole = true;
@@ -551,6 +467,8 @@ static void run_free(silt_run *run) {
     free(run->grown_area);
     free(run->body_before);
     free(run->x_old);
+    free(run->p_old);
+    free(run->p_shown);
     free(run->v_old);
     free(run->debt_old);
     free(run->wall_before);
@@ -564,7 +482,7 @@ static void run_free(silt_run *run) {
 
 static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock,
                              silt_error *err) {
-    *run = (silt_run){.scene = scene, .def = *def, .saved_step = -1, .lock = lock};
+    *run = (silt_run){.scene = scene, .def = *def, .saved_step = -1, .lock = lock, .n_shown = -1};
     run->out = silt_text("%s", out);
     run->log = silt_text("%s/dem.log", out);
     run->worker = silt_worker_find(def->worker);

@@ -84,9 +84,20 @@ struct silt_run {
     double *debt_before; // owned, 1 per node
     int wall_before_capacity, v_before_capacity, debt_before_capacity;
     int *map;        // owned, renumbering of the last rebuild
-    int x_old_capacity, v_old_capacity, debt_old_capacity, map_capacity;
+    double *p_old;   // owned, 1 per node, pressures at the start of the step: of the middle of the step before
+    int n_old, n_shown; // nodes at the start of the step; nodes that p_shown is of, -1: of none
+    double dt_old;   // s, length of the step before; 0: none
+    silt_nodes shown; // what output sees: the nodes with the pressure p_shown, the rest borrowed from nodes
+    double *p_shown; // owned, 1 per node
+    int x_old_capacity, v_old_capacity, debt_old_capacity, map_capacity, p_old_capacity, p_shown_capacity;
     double box_lo[3], box_hi[3]; // what lies outside has left
 };
+
+// ledger.c --------------------------------------------------------------------------------------------
+/** volume, mass, momentum, energy and sediment of the state, and their errors so far */
+void silt_run_ledger(silt_run *run);
+/** forces of the step that was solved: what the water's momentum leaves open, and whether what grains got the water lost */
+void silt_run_balance(silt_run *run);
 
 // start.c ---------------------------------------------------------------------------------------------
 void silt_run_box(silt_run *run);

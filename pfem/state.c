@@ -59,6 +59,7 @@ silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
         silt_store_close(&store);
     // what outlives a step is dropped on both sides of a checkpoint
     silt_pressure_forget(run->fluid.pressure);
+    silt_stiff_forget(run->fluid.stiff);
     return status;
 }
 

@@ -83,6 +83,7 @@ static void summary_print(FILE *to, const silt_view *view, const silt_summary *s
     fprintf(to, "\"steps_here\": %lld,\n  ", (long long)summary->steps);
     fprintf(to, "\"retries\": %lld,\n  ", (long long)summary->retries);
     fprintf(to, "\"iterations\": %lld,\n  ", (long long)summary->iterations);
+    fprintf(to, "\"most_iterations\": %lld,\n  ", (long long)summary->most_iterations);
     json_number(to, "seconds", summary->seconds, ",\n  ");
     json_number(to, "node_steps", summary->node_steps, ",\n  ");
     json_number(to, "microseconds_per_node_step", summary->seconds * per_node, ",\n  ");

@@ -112,6 +112,7 @@ typedef struct silt_wall_point {
     double area;         // m or m2 of wall that the node stands for; 0: no water to sample
     double height;       // m, of the sample above the wall: less than asked where the water is thinner
     double roughness;    // m, k_s
+    double toe;          // m, way along the wall to the water's edge that runs over dry wall, 0: none near
     double velocity[3];  // m/s, of the wall
     double shear[3];     // Pa, of the last traction: stress of the water on the wall
 } silt_wall_point;

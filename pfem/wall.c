@@ -37,6 +37,18 @@ static void element_condition(silt_walls *walls, int e, int w, const silt_wall *
     walls->roughness[e] = wall->condition == WALL_LAW ? wall->roughness : -1;
 }
 
+// A wall that ends where the scene repeats goes on behind: nodes there slide on it before they are taken to the other end.
+static void segment_overhang(const silt_scene *scene, double *end, double dx, double dy) {
+    const double period = scene->period[1] - scene->period[0];
+    if (!(period > 0) || fabs(dx) < 1e-6 * fabs(dy))
+        return;
+    const double border = dx > 0 ? scene->period[1] : scene->period[0], reach = 0.25 * period;
+    if (fabs(end[0] - border) > 1e-9 * period)
+        return;
+    end[0] += dx > 0 ? reach : -reach;
+    end[1] += reach * dy / fabs(dx);
+}
+
 static void segments_make(silt_walls *walls, const silt_scene *scene) {
     int s = 0;
     for (int w = 0; w < scene->n_wall; w++) {
@@ -49,6 +61,10 @@ static void segments_make(silt_walls *walls, const silt_scene *scene) {
                 walls->from[s][d] = a[d];
                 walls->to[s][d] = b[d];
             }
+            if (!wall->closed && k == 0)
+                segment_overhang(scene, walls->from[s], -dx, -dy);
+            if (!wall->closed && k == count - 1)
+                segment_overhang(scene, walls->to[s], dx, dy);
             walls->normal[s][0] = -dy / length;
             walls->normal[s][1] = dx / length;
             element_condition(walls, s, w, wall);

@@ -4,6 +4,8 @@
 #define WALL_SMOOTH 9.8    // E of u+ = ln(E y+)/kappa
 #define WALL_THIN 3.0      // least 30 y/k_s: water that is thinner than a tenth of the roughness
 #define WALL_HEIGHT 2.0    // times h, where the scene says nothing
+#define TOE_REACH 30.0     // times h: farther behind the water's edge the layer has grown up
+#define TOE_STRESS 0.4438  // tau sqrt(U s/nu)/(rho U^2) of a wall drawn through still water (Sakiadis 1961)
 #define WALK_LIMIT 64      // cells on the way to a sample
 #define BISECTIONS 10
 
@@ -229,6 +231,62 @@ static void point_sample(silt_wall_point *point, const silt_mesh *mesh, const do
         point->area = 0;
 }
 
+// ---- the edge of water that runs over dry wall
+
+// The layer of slow water on a wall begins where the water first meets it: behind the edge of water that runs over dry wall it is
+// thinner than any film, and its stress larger than that of a layer grown through the water. Finds how far each point is from
+// such an edge. law->entry: points of the nodes; facets of the law only.
+static void toe_find(silt_wall_law *law, const silt_scene *scene, const silt_walls *walls, const silt_nodes *nodes,
+                     const silt_mesh *mesh, const double *x) {
+    const int dim = mesh->dim == 3 ? 3 : 2, n = mesh->n_node;
+    uint8_t *edge = silt_alloc((size_t)n + 1, 1);
+    double *out = silt_alloc((size_t)n + 1, 3 * sizeof *out), roughness;
+    int element, n_edge = 0;
+    for (int k = 0; k < mesh->n_facet; k++) {
+        const bool open = mesh->facet_kind[k] == FACET_FREE;
+        const bool law_wall = !open && condition_of(scene, walls, nodes, mesh, k, &roughness, &element) == WALL_LAW;
+        const int *facet = mesh->facet[k];
+        for (int a = 0; a < dim; a++) {
+            edge[facet[a]] |= open ? 1 : law_wall ? 2 : 0;
+            // out of the wetted part of the wall
+            for (int b = 0; b < dim && law_wall; b++)
+                for (int d = 0; d < dim && b != a; d++)
+                    out[3 * facet[a] + d] += shortest(mesh, d, x[dim * facet[a] + d] - x[dim * facet[b] + d]);
+        }
+    }
+    int *list = silt_alloc((size_t)law->n_point + 1, sizeof *list);
+    for (int q = 0; q < law->n_point; q++) {
+        const silt_wall_point *point = &law->point[q];
+        const int i = point->node;
+        double ahead = 0;
+        for (int d = 0; d < dim && edge[i] == 3; d++)
+            ahead += (nodes->v[dim * i + d] - point->velocity[d]) * out[3 * i + d];
+        if (ahead > 0)
+            list[n_edge++] = i;
+    }
+    for (int q = 0; q < law->n_point; q++) {
+        silt_wall_point *point = &law->point[q];
+        const double h = silt_node_h(nodes, point->node, scene->fluid.size);
+        double nearest = silt_square(TOE_REACH * h);
+        for (int k = 0; k < n_edge; k++) {
+            double way = 0, off = 0;
+            for (int d = 0; d < dim; d++) {
+                const double part = shortest(mesh, d, x[dim * point->node + d] - x[dim * list[k] + d]);
+                way += part * part;
+                off += part * point->normal[d];
+            }
+            // on this wall, not on one across the corner
+            if (off * off < 0.25 * h * h && way < nearest)
+                nearest = way;
+        }
+        // the edge itself stands for the half facet behind it: mean of s^-1/2
+        point->toe = nearest < silt_square(TOE_REACH * h) ? silt_max(sqrt(nearest), 0.125 * h) : 0;
+    }
+    free(edge);
+    free(out);
+    free(list);
+}
+
 void silt_wall_law_place(silt_wall_law *law, const silt_scene *scene, const silt_walls *walls, const silt_nodes *nodes,
                          const silt_mesh *mesh, const double *x) {
     const int dim = mesh->dim == 3 ? 3 : 2, n = mesh->n_node;
@@ -299,6 +357,7 @@ void silt_wall_law_place(silt_wall_law *law, const silt_scene *scene, const silt
         const double h = silt_node_h(nodes, point->node, scene->fluid.size);
         point_sample(point, mesh, x, silt_max(silt_wall_height(&scene->fluid) * h, 2 * point->roughness));
     }
+    toe_find(law, scene, walls, nodes, mesh, x);
 }
 
 void silt_wall_law_traction(silt_wall_law *law, const silt_scene *scene, int dim, const double *v, double *friction,
@@ -327,7 +386,12 @@ void silt_wall_law_traction(silt_wall_law *law, const silt_scene *scene, int dim
         }
         speed = sqrt(speed);
         double slope;
-        const double stress = silt_wall_stress(rho, nu, speed, point->height, point->roughness, &slope);
+        double stress = silt_wall_stress(rho, nu, speed, point->height, point->roughness, &slope);
+        const double thin = point->toe > 0 ? TOE_STRESS * rho * speed * sqrt(nu * speed / point->toe) : 0;
+        if (thin > stress) {
+            stress = thin;
+            slope = 1.5 * thin / speed;
+        }
         friction[i] = point->area * slope;
         for (int d = 0; d < dim; d++) {
             point->shear[d] = speed > 0 ? stress * along[d] / speed : 0;

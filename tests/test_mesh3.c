@@ -1,4 +1,5 @@
-// the mesh in two and three dimensions alike: adjacency, boundary, slivers, bookkeeping, periodic border, handing on momentum
+// the mesh in two and three dimensions alike: adjacency, boundary, slivers, bookkeeping, periodic border, handing on
+// momentum
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -7,7 +8,8 @@
 #include "delaunay.h"
 #include "remesh.h"
 
-// ---- a box of jittered nodes, without files: walls are the planes x = 0, x = 1, y = 0, ... of the unit box by patch only
+// ---- a box of jittered nodes, without files: walls are the planes x = 0, x = 1, y = 0, ... of the unit box by patch
+// only
 
 typedef struct bench {
     int dim;
@@ -147,7 +149,8 @@ static void surface_integrals(const bench *b, double sum[3], double *volume) {
                 area[d] = 0.5 * (u[(d + 1) % 3] * v[(d + 2) % 3] - u[(d + 2) % 3] * v[(d + 1) % 3]);
         }
         // the flux of x sees a periodic border, that of y does not
-        const double mean = b->dim == 2 ? 0.5 * (p[1] + q[1]) : (p[1] + q[1] + b->nodes.x[3 * mesh->facet[k][2] + 1]) / 3;
+        const double mean =
+            b->dim == 2 ? 0.5 * (p[1] + q[1]) : (p[1] + q[1] + b->nodes.x[3 * mesh->facet[k][2] + 1]) / 3;
         *volume += mean * area[1];
         for (int d = 0; d < b->dim; d++)
             sum[d] += area[d];
@@ -382,10 +385,12 @@ static void check_same(const bench *a, const bench *b, const char *what, int ste
         apart += silt_cell_set_find(&set, cell) < 0;
     }
     if (apart || a->mesh.n_cell != b->mesh.n_cell)
-        fail_msg("%s, %d-D, step %d: %d of %d cells differ (%d in the other)", what, dim, step, apart, a->mesh.n_cell, b->mesh.n_cell);
+        fail_msg("%s, %d-D, step %d: %d of %d cells differ (%d in the other)", what, dim, step, apart, a->mesh.n_cell,
+                 b->mesh.n_cell);
     for (int i = 0; i < n; i++)
         if (fabs(a->nodes.debt[i] - b->nodes.debt[other[a->nodes.id[i]]]) > 1e-14)
-            fail_msg("%s, %d-D, step %d: debts differ by %.3g", what, dim, step, a->nodes.debt[i] - b->nodes.debt[other[a->nodes.id[i]]]);
+            fail_msg("%s, %d-D, step %d: debts differ by %.3g", what, dim, step,
+                     a->nodes.debt[i] - b->nodes.debt[other[a->nodes.id[i]]]);
     silt_cell_set_clear(&set);
     free(other);
 }
@@ -562,7 +567,8 @@ static void test_slide_along_a_wall_books_nothing(void **state) {
 
 static void test_gap_closes(void **state) {
     (void)state;
-    // two blocks with a gap between them: it joins when it is narrower than merge and closing, not before, not when opening
+    // two blocks with a gap between them: it joins when it is narrower than merge and closing, not before, not when
+    // opening
     for (int dim = 2; dim <= 3; dim++)
         for (int trial = 0; trial < 3; trial++) {
             bench b;
@@ -614,7 +620,8 @@ static void test_gap_closes(void **state) {
                     right += b.nodes.x[dim * b.mesh.cell[e][a]] >= 0.5;
                 across += right > 0 && right <= dim;
             }
-            print_message("%d-D, gap %.2f h, %s: %.1f %% filled\n", dim, gap, trial == 2 ? "opening" : "closing", 100 * made / (gap * h));
+            print_message("%d-D, gap %.2f h, %s: %.1f %% filled\n", dim, gap, trial == 2 ? "opening" : "closing",
+                          100 * made / (gap * h));
             assert_true(fabs(made + debts(&b)) < 1e-12);
             if (trial == 1)
                 assert_true(across > 8 && made > 0.9 * gap * h);
@@ -659,7 +666,8 @@ static void totals(const bench *b, double momentum[3], double *energy) {
     for (int e = 0; e < b->mesh.n_cell; e++)
         for (int a = 0; a <= dim; a++)
             for (int d = 0; d < dim; d++) {
-                const double v = b->nodes.v[dim * b->mesh.cell[e][a] + d], m = silt_cell_volume(&b->mesh, b->nodes.x, e) / (dim + 1);
+                const double v = b->nodes.v[dim * b->mesh.cell[e][a] + d],
+                             m = silt_cell_volume(&b->mesh, b->nodes.x, e) / (dim + 1);
                 momentum[d] += m * v;
                 *energy += 0.5 * m * v * v;
             }
@@ -718,6 +726,8 @@ static void momentum_trial(int dim, unsigned walled, int field) {
         }
         silt_momentum_hand_on(&b.memory, &b.mesh, &b.nodes, 1, NULL, debt, v, b.map, lost);
         totals(&b, after, &e2);
+        if (field != FIELD_LINEAR && e2 > e0 * (1 + 1e-12)) // the linear one goes through the walls, which do work
+            fail_msg("%d-D, %s, step %d: energy up by %.2g of it", dim, name[field], step, e2 / e0 - 1);
         energy[0] += (e1 - e0) / e0;
         energy[1] += (e2 - e0) / e0;
         for (int d = 0; d < dim; d++) {
@@ -739,12 +749,14 @@ static void momentum_trial(int dim, unsigned walled, int field) {
         free(v);
         free(debt);
     }
-    print_message("%d-D, %s%s: momentum off by at most %.2g (%.2g without); not placed %.2g of %.2g; velocities moved by %.2g;"
-                  " energy %+.2g (%+.2g without)\n", dim, name[field], walled ? ", walls" : "", worst, plain,
-                  lost_sum[0] + lost_sum[1] + lost_sum[2], all_plain, moved, energy[1], energy[0]);
+    print_message(
+        "%d-D, %s%s: momentum off by at most %.2g (%.2g without); not placed %.2g of %.2g; velocities moved by %.2g;"
+        " energy %+.2g (%+.2g without)\n",
+        dim, name[field], walled ? ", walls" : "", worst, plain, lost_sum[0] + lost_sum[1] + lost_sum[2], all_plain,
+        moved, energy[1], energy[0]);
     assert_true(worst < 1e-14);
-    if (field == FIELD_LINEAR)
-        assert_true(plain < 1e-14 && moved < 1e-12);
+    if (field == FIELD_LINEAR) // touched only so that the energy does not grow; from node to node it differs by 2 h
+        assert_true(plain < 1e-14 && moved < b.scene.fluid.size);
     else
         assert_true(plain > 1e-6); // the test is not empty
     // a group may be held by walls altogether; in violent motion nodes owe more than they have now and then

@@ -624,6 +624,44 @@ static void test_wall_points(void **state) {
     }
 }
 
+// behind an edge of water that runs over dry wall the layer is young, and its stress that of Sakiadis
+static void test_young_layer(void **state) {
+    (void)state;
+    column c;
+    column_open(&c, 2, 5, 0.4);
+    c.nodes.v = silt_alloc((size_t)(2 * c.nodes.count), sizeof(double));
+    int gap = -1, left = -1;
+    for (int k = 0; k < c.mesh.n_facet && gap < 0; k++)
+        if (c.mesh.facet_kind[k] == FACET_WALL)
+            gap = k;
+    assert_true(gap >= 0);
+    c.mesh.facet_kind[gap] = FACET_FREE; // a facet of the wall without water
+    for (int a = 0; a < 2; a++) {
+        const double step = c.nodes.x[2 * c.mesh.facet[gap][1 - a]] - c.nodes.x[2 * c.mesh.facet[gap][a]];
+        if (fabs(step - c.h) < 1e-9 || step < -1.5 * c.h)
+            left = c.mesh.facet[gap][a];
+    }
+    assert_true(left >= 0);
+    for (int turn = 0; turn < 2; turn++) {
+        // all go to the right: the node left of the gap runs into it; then they stand
+        for (int i = 0; i < c.nodes.count; i++)
+            c.nodes.v[2 * i] = c.v[2 * i] = turn == 0 ? 2 : 0;
+        column_place(&c);
+        silt_wall_law_traction(&c.law, &c.scene, 2, c.v, c.friction, c.force);
+        for (int q = 0; q < c.law.n_point; q++) {
+            const silt_wall_point *p = &c.law.point[q];
+            const double grown = silt_wall_stress(1000, 1e-6, c.v[0], p->height, 0, NULL);
+            if (p->node == left && turn == 0)
+                NEAR(p->toe, 0.125 * c.h, 1e-12);
+            else if (turn == 1)
+                NEAR(p->toe, 0, 0);
+            const double young = p->toe > 0 ? 0.4438 * 1000 * 2 * sqrt(1e-6 * 2 / p->toe) : 0;
+            NEAR(p->shear[0], silt_max(grown, young), 1e-9);
+        }
+    }
+    column_close(&c);
+}
+
 // ---- uniform rough channel: H = 0.1 m, slope 1e-3, 1 mm sand
 
 #define CHANNEL_SLOPE 9.81e-3
@@ -728,6 +766,7 @@ int main(void) {
         cmocka_unit_test(test_films_of_mud),
         cmocka_unit_test(test_wall_stress),
         cmocka_unit_test(test_wall_points),
+        cmocka_unit_test(test_young_layer),
         cmocka_unit_test(test_rough_channel),
         cmocka_unit_test(test_channel_starts),
         cmocka_unit_test(test_channel_starts_without_iterations),

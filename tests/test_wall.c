@@ -1023,6 +1023,15 @@ static void test_gate(void **state) {
     assert_near(point[4], 0.8, 1e-15);
     free(point);
     free(ridge);
+    // before its foot floor and face hold, not the foot's underside
+    for (int k = 0; k < 9; k++) {
+        const double x[2] = {1 + 1e-5 * (k % 3 - 1), 1e-5 * (k / 3 - 1)};
+        double on[3];
+        int element[3];
+        assert_int_equal(silt_walls_touching(&b->walls, x, 1e-4, element, on), 2);
+        assert_true(element[0] + element[1] == 4 && element[0] * element[1] == 3);
+        assert_point(on, 1, 0, 0, 2, 1e-13);
+    }
     const int foot = node_at(b, (double[]){1, 0}, (double[]){0, 0}, 3, 1);
     const int low = node_at(b, (double[]){1, 0.045}, (double[]){0, 0}, 3, -1);
     const int high = node_at(b, (double[]){1, 0.4}, (double[]){0, 0}, 3, -1);

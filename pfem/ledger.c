@@ -1,0 +1,123 @@
+// the ledger: what there is of water and sediment, where it went, what moves it
+#include "run.h"
+
+void silt_run_ledger(silt_run *run) {
+    silt_ledger *ledger = &run->ledger;
+    const silt_nodes *nodes = &run->nodes;
+    const silt_scene *scene = run->scene;
+    const double rho = scene->fluid.density;
+    ledger->kinetic_energy = ledger->potential_energy = 0;
+    memset(ledger->momentum, 0, sizeof ledger->momentum);
+    ledger->mesh_volume = ledger->flying_volume = ledger->fluid_volume = 0;
+    const int D = silt_nodes_dim(nodes);
+    for (int e = 0; e < run->mesh.n_cell; e++) {
+        const int *cell = run->mesh.cell[e];
+        const double volume = silt_cell_volume(&run->mesh, nodes->x, e);
+        double water = volume, corner[12], height = 0;
+        silt_cell_corners(&run->mesh, nodes->x, cell, corner);
+        ledger->mesh_volume += volume;
+        for (int a = 0; a <= D; a++) {
+            if (run->drag)
+                water -= volume * run->drag->solid[cell[a]] / (D + 1);
+            for (int d = 0; d < D; d++)
+                height += corner[D * a + d] * scene->gravity[d] / (D + 1);
+        }
+        ledger->fluid_volume += water;
+        for (int a = 0; a <= D; a++)
+            for (int d = 0; d < D; d++) {
+                const double m = rho * water / (D + 1), v = nodes->v[D * cell[a] + d];
+                ledger->momentum[d] += m * v;
+                ledger->kinetic_energy += 0.5 * m * v * v;
+            }
+        ledger->potential_energy -= rho * water * height;
+    }
+    for (int i = 0; i < nodes->count; i++) {
+        if (run->mesh.wet[i])
+            continue;
+        const double volume = nodes->debt[i];
+        ledger->flying_volume += volume;
+        for (int d = 0; d < D; d++) {
+            ledger->momentum[d] += rho * volume * nodes->v[D * i + d];
+            ledger->kinetic_energy += 0.5 * rho * volume * silt_square(nodes->v[D * i + d]);
+            ledger->potential_energy -= rho * volume * nodes->x[D * i + d] * scene->gravity[d];
+        }
+    }
+    ledger->max_speed = 0;
+    for (int i = 0; i < nodes->count; i++)
+        if (run->mesh.wet[i] || nodes->kind[i] == NODE_FLUID)
+            ledger->max_speed = silt_max(ledger->max_speed, silt_length(D, nodes->v + D * i));
+    // parcels that wait are solid in the place where they were released
+    for (int k = 0; k < run->n_waiting && scene->fluid.on; k++)
+        ledger->fluid_volume -= run->waiting[k].mass / scene->bed.density;
+    ledger->fluid_volume += ledger->flying_volume;
+    ledger->fluid_mass = rho * ledger->fluid_volume;
+    ledger->volume_owed = 0;
+    for (int i = 0; i < nodes->count; i++)
+        ledger->volume_owed += run->mesh.wet[i] ? nodes->debt[i] : 0;
+    if (scene->fluid.on)
+        silt_water_moment(nodes, &run->mesh, run->drag ? run->drag->solid : NULL, rho, (const double[3]){0}, ledger->angular_momentum);
+    ledger->y_plus = run->fluid.law.n_point ? run->fluid.law.y_plus[1] : NAN;
+    ledger->bed_mass = run->bed.solid_mass;
+    ledger->pore_water_mass = run->bed.pore_water;
+    ledger->grain_count = 0;
+    ledger->grain_mass = 0;
+    memset(ledger->grain_velocity, 0, sizeof ledger->grain_velocity);
+    if (run->coupling) {
+        const silt_grain_state *grains = silt_coupling_dem.grains(run->coupling);
+        double moving = 0;
+        for (int k = 0; k < grains->count; k++) {
+            moving += grains->mass[k];
+            for (int d = 0; d < 3; d++)
+                ledger->grain_velocity[d] += grains->mass[k] * grains->v[3 * k + d];
+        }
+        for (int d = 0; d < 3 && moving > 0; d++)
+            ledger->grain_velocity[d] /= moving;
+        ledger->grain_count = grains->count + run->n_waiting;
+        // summed with care: the sediment must close to rounding
+        double carry = 0;
+        for (int k = 0; k < grains->count + run->n_waiting; k++) {
+            const double m = (k < grains->count ? grains->mass[k] : run->waiting[k - grains->count].mass) - carry;
+            const double sum = ledger->grain_mass + m;
+            carry = (sum - ledger->grain_mass) - m;
+            ledger->grain_mass = sum;
+        }
+        int64_t count;
+        const double left = ledger->left_mass;
+        silt_coupling_dem.left(run->coupling, &ledger->left_mass, &count);
+        // what left the mesh was water and what it carried
+        if (scene->bed.on)
+            ledger->outflow_mass -= rho * (ledger->left_mass - left) / scene->bed.density;
+    }
+    if (run->step == 0) {
+        ledger->initial_volume = ledger->fluid_volume;
+        ledger->initial_sediment = ledger->bed_mass + ledger->grain_mass;
+    }
+    const double base = ledger->initial_volume + ledger->inflow_mass / rho;
+    const double expected = base - ledger->outflow_mass / rho + ledger->pore_water_mass / rho;
+    ledger->volume_error = scene->fluid.on && base > 0 ? (ledger->fluid_volume - expected) / base : 0;
+    const double sediment = ledger->bed_mass + ledger->grain_mass + ledger->left_mass - ledger->initial_sediment;
+    ledger->sediment_error = ledger->initial_sediment > 0 ? sediment / ledger->initial_sediment : 0;
+
+    silt_summary *summary = &run->summary;
+    summary->worst_volume_error = silt_max(summary->worst_volume_error, fabs(ledger->volume_error));
+    summary->worst_sediment_error = silt_max(summary->worst_sediment_error, fabs(ledger->sediment_error));
+    summary->worst_momentum_error = silt_max(summary->worst_momentum_error, ledger->momentum_error);
+}
+
+// forces of the step that was solved: what the water's momentum leaves open, and whether what grains got the water lost
+void silt_run_balance(silt_run *run) {
+    silt_ledger *ledger = &run->ledger;
+    const silt_fluid *fluid = &run->fluid;
+    ledger->momentum_error = fluid->momentum_scale > 0 ? fluid->momentum_residual / fluid->momentum_scale : 0;
+    if (!run->coupling)
+        return;
+    silt_exchanged exchanged;
+    silt_coupling_dem.exchanged(run->coupling, &exchanged);
+    for (int d = 0; d < 2; d++) {
+        ledger->grain_water[d] = exchanged.grains[d];
+        ledger->grain_contact[d] = exchanged.contact[d];
+    }
+    const double open = hypot(fluid->from_grains[0] + exchanged.grains[0], fluid->from_grains[1] + exchanged.grains[1]);
+    if (exchanged.size > 0)
+        ledger->momentum_error = silt_max(ledger->momentum_error, open / exchanged.size);
+}

@@ -1,0 +1,293 @@
+// stiff viscosity in two dimensions: momentum and continuity are factored as one system, and the momentum alone for its own solver.
+// [A -G; -G^T -L] is symmetric and quasi-definite: every order of elimination has an LDL^T factor (Vanderbei, SIAM J. Optim. 5, 1995).
+// Node by node, the velocities first, with the order of the nodes that suits their graph.
+#include <cholmod.h>
+
+#include "fluid.h"
+
+/** a symmetric matrix with m unknowns a node and its factor */
+typedef struct silt_blocks {
+    int m;
+    cholmod_factor *factor;   // owned
+    cholmod_sparse *matrix;   // owned, lower triangle by columns
+} silt_blocks;
+
+struct silt_stiff {
+    cholmod_common common;
+    silt_blocks velocity, saddle; // A; with the pressure
+    int64_t revision;             // of the mesh that patterns and factors belong to
+    bool ready;                   // factors are those of the present step
+    int n;
+    double *entry;                // owned, (dim + 1)^2 per neighbour
+    double *right;                // owned, dim + 1 per node
+    int *closed;                  // owned, per node, group of joined water; then 1: its pressure is pinned
+    cholmod_dense *solution, *work_y, *work_e; // owned
+    int entry_capacity, right_capacity, closed_capacity;
+};
+
+void silt_stiff_forget(silt_stiff *stiff) {
+    if (!stiff)
+        return;
+    silt_blocks *both[2] = {&stiff->velocity, &stiff->saddle};
+    for (int k = 0; k < 2; k++) {
+        cholmod_free_factor(&both[k]->factor, &stiff->common);
+        cholmod_free_sparse(&both[k]->matrix, &stiff->common);
+    }
+    stiff->revision = -1;
+    stiff->ready = false;
+}
+
+void silt_stiff_free(silt_stiff **stiff) {
+    if (!*stiff)
+        return;
+    silt_stiff *q = *stiff;
+    silt_stiff_forget(q);
+    cholmod_free_dense(&q->solution, &q->common);
+    cholmod_free_dense(&q->work_y, &q->common);
+    cholmod_free_dense(&q->work_e, &q->common);
+    cholmod_finish(&q->common);
+    free(q->entry);
+    free(q->right);
+    free(q->closed);
+    free(q);
+    *stiff = NULL;
+}
+
+void silt_stiff_end(silt_stiff *stiff) {
+    if (stiff)
+        stiff->ready = false;
+}
+
+bool silt_stiff_ready(const silt_stiff *stiff) { return stiff && stiff->ready; }
+
+static int entry_index(const silt_mesh *mesh, int i, int j) {
+    int lo = mesh->neighbour_start[i], hi = mesh->neighbour_start[i + 1] - 1;
+    while (lo < hi) {
+        const int mid = (lo + hi) / 2;
+        if (mesh->neighbour[mid] < j)
+            lo = mid + 1;
+        else
+            hi = mid;
+    }
+    return lo;
+}
+
+// pattern of m unknowns a node, and the order of elimination from that of the nodes
+static void pattern(silt_stiff *q, silt_blocks *b, const silt_mesh *mesh, int m, const int *order) {
+    const int n = mesh->n_node;
+    b->m = m;
+    cholmod_free_factor(&b->factor, &q->common);
+    cholmod_free_sparse(&b->matrix, &q->common);
+    size_t filled = 0;
+    for (int j = 0; j < n; j++)
+        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
+            filled += (size_t)(mesh->neighbour[k] > j ? m * m : mesh->neighbour[k] == j ? m * (m + 1) / 2 : 0);
+    b->matrix = cholmod_allocate_sparse((size_t)(m * n), (size_t)(m * n), filled, 1, 1, -1, CHOLMOD_REAL, &q->common);
+    int *start = b->matrix->p, *index = b->matrix->i, at = 0;
+    for (int j = 0; j < n; j++)
+        for (int c = 0; c < m; c++) {
+            start[m * j + c] = at;
+            for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
+                const int i = mesh->neighbour[k];
+                for (int r = i == j ? c : 0; r < m && i >= j; r++)
+                    index[at++] = m * i + r;
+            }
+        }
+    start[m * n] = at;
+    int *perm = silt_alloc((size_t)(m * n) + 1, sizeof *perm);
+    for (int k = 0; k < n; k++)
+        for (int c = 0; c < m; c++)
+            perm[m * k + c] = m * order[k] + c;
+    q->common.supernodal = m == 2 ? CHOLMOD_AUTO : CHOLMOD_SIMPLICIAL; // supernodes are for positive definite matrices only
+    b->factor = cholmod_analyze_p(b->matrix, perm, NULL, 0, &q->common);
+    free(perm);
+}
+
+// order of the nodes by minimum degree
+static int *node_order(silt_stiff *q, const silt_mesh *mesh) {
+    const int n = mesh->n_node;
+    size_t filled = 0;
+    for (int j = 0; j < n; j++)
+        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
+            filled += mesh->neighbour[k] >= j;
+    cholmod_sparse *graph = cholmod_allocate_sparse((size_t)n, (size_t)n, filled, 1, 1, -1, CHOLMOD_PATTERN, &q->common);
+    int *start = graph->p, *index = graph->i, at = 0;
+    for (int j = 0; j < n; j++) {
+        start[j] = at;
+        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
+            if (mesh->neighbour[k] >= j)
+                index[at++] = mesh->neighbour[k];
+    }
+    start[n] = at;
+    int *order = silt_alloc((size_t)n + 1, sizeof *order);
+    for (int k = 0; k < n; k++)
+        order[k] = k;
+    cholmod_amd(graph, NULL, 0, order, &q->common);
+    cholmod_free_sparse(&graph, &q->common);
+    return order;
+}
+
+// pieces of water without a free surface know their pressure up to a constant
+static void find_closed(silt_stiff *q, const silt_mesh *mesh) {
+    const int n = mesh->n_node;
+    SILT_RESERVE(q->closed, q->closed_capacity, 2 * n + 2);
+    int *parent = q->closed + n + 1;
+    for (int i = 0; i < n; i++) {
+        parent[i] = i;
+        q->closed[i] = 0;
+    }
+    for (int e = 0; e < mesh->n_cell; e++)
+        silt_group_join(parent, mesh->cell[e]);
+    for (int i = 0; i < n; i++)
+        if (mesh->wet[i])
+            q->closed[silt_group_find(parent, i)] = 1;
+    for (int i = 0; i < n; i++)
+        if (mesh->surface[i])
+            q->closed[silt_group_find(parent, i)] = 0;
+}
+
+// [K -G; -G^T -L] of every pair of neighbours, without inertia and without regard to what is held
+static void assemble(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh) {
+    enum { D = 2, M = 3 };
+    memset(q->entry, 0, (size_t)(M * M * mesh->neighbour_start[mesh->n_node]) * sizeof *q->entry);
+    for (int e = 0; e < mesh->n_cell; e++) {
+        const int *cell = mesh->cell[e];
+        const double *flux = f->flux + M * D * e, viscous = f->mu[e] * f->inverse[e], smooth = f->tau[e] * f->inverse[e];
+        for (int a = 0; a < M; a++)
+            for (int b = 0; b < M; b++) {
+                double *out = q->entry + M * M * entry_index(mesh, cell[a], cell[b]);
+                const double *fa = flux + D * a, *fb = flux + D * b, along = fa[0] * fb[0] + fa[1] * fb[1];
+                for (int d = 0; d < D; d++) {
+                    for (int k = 0; k < D; k++)
+                        out[M * d + k] += viscous * ((d == k ? along : 0) + fb[d] * fa[k] - 2.0 / 3 * fa[d] * fb[k]);
+                    out[M * d + D] -= fa[d] / M + (f->share ? f->share[M * e + a] * fb[d] : 0);
+                    out[M * D + d] -= fb[d] / M + (f->share ? f->share[M * e + b] * fa[d] : 0);
+                }
+                out[M * D + D] -= smooth * along;
+            }
+    }
+}
+
+// inertia on the diagonal; held components taken out
+static void hold(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh) {
+    enum { D = 2, M = 3 };
+    for (int i = 0; i < q->n; i++) {
+        double own = 0;
+        for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++) {
+            const int j = mesh->neighbour[k];
+            double *out = q->entry + M * M * k;
+            if (i == j) {
+                own = f->inertia[i] + 0.5 * (out[0] + out[M + 1]);
+                for (int d = 0; d < D; d++)
+                    out[M * d + d] += f->inertia[i];
+                // a crumb between held nodes knows its pressure up to a constant too
+                out[M * D + D] *= q->closed[i] ? 2 : 1 + 1e-9;
+                if (!mesh->wet[i] || !(out[M * D + D] < 0))
+                    out[M * D + D] = -1;
+            }
+            if (f->hold[i] != HOLD_FREE)
+                for (int c = 0; c < M; c++) { // columns: velocity of row i
+                    double column[3] = {out[c], out[M + c], 0};
+                    silt_hold_project(f, i, column);
+                    out[c] = column[0];
+                    out[M + c] = column[1];
+                }
+            if (f->hold[j] != HOLD_FREE)
+                for (int r = 0; r < M; r++)
+                    silt_hold_project(f, j, out + M * r);
+            if (i == j && f->hold[i] != HOLD_FREE)
+                for (int d = 0; d < D; d++) {
+                    double unit[3] = {d == 0, d == 1, 0}, free_part[3] = {unit[0], unit[1], 0};
+                    silt_hold_project(f, i, free_part);
+                    for (int k2 = 0; k2 < D; k2++)
+                        out[M * k2 + d] += own * (unit[k2] - free_part[k2]);
+                }
+        }
+    }
+}
+
+static void fill(const silt_stiff *q, silt_blocks *b, const silt_mesh *mesh) {
+    const int m = b->m;
+    double *value = b->matrix->x;
+    int at = 0;
+    for (int j = 0; j < q->n; j++)
+        for (int c = 0; c < m; c++)
+            for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
+                const int i = mesh->neighbour[k];
+                for (int r = i == j ? c : 0; r < m && i >= j; r++)
+                    value[at++] = q->entry[9 * k + 3 * c + r]; // block (j, i) is block (i, j) turned over
+            }
+}
+
+silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const silt_step *s, silt_error *err) {
+    const silt_mesh *mesh = s->mesh;
+    if (!*stiff) {
+        *stiff = silt_alloc(1, sizeof **stiff);
+        cholmod_start(&(*stiff)->common);
+        (*stiff)->common.print = 0;
+        (*stiff)->common.nmethods = 1;
+        (*stiff)->common.method[0].ordering = CHOLMOD_GIVEN;
+        (*stiff)->common.postorder = 1;
+        (*stiff)->common.quick_return_if_not_posdef = 1;
+        (*stiff)->revision = -1;
+    }
+    silt_stiff *q = *stiff;
+    q->ready = false;
+    q->n = mesh->n_node;
+    SILT_RESERVE(q->entry, q->entry_capacity, 9 * mesh->neighbour_start[q->n] + 1);
+    SILT_RESERVE(q->right, q->right_capacity, 3 * q->n + 1);
+    if (q->revision != mesh->revision || !q->velocity.matrix) {
+        int *order = node_order(q, mesh);
+        pattern(q, &q->velocity, mesh, 2, order);
+        pattern(q, &q->saddle, mesh, 3, order);
+        free(order);
+        find_closed(q, mesh);
+        q->revision = mesh->revision;
+    }
+    assemble(q, f, mesh);
+    hold(q, f, mesh);
+    silt_blocks *both[2] = {&q->velocity, &q->saddle};
+    for (int k = 0; k < 2; k++) {
+        fill(q, both[k], mesh);
+        if (!both[k]->factor || !cholmod_factorize(both[k]->matrix, both[k]->factor, &q->common) ||
+            q->common.status == CHOLMOD_NOT_POSDEF) {
+            q->revision = -1;
+            return silt_fail(err, SILT_FAILED, "the %s matrix of the stiff water could not be factored", k ? "saddle-point" : "momentum");
+        }
+    }
+    q->ready = true;
+    return SILT_OK;
+}
+
+static silt_status solve(silt_stiff *q, silt_blocks *b, double *right, silt_error *err) {
+    const size_t n = (size_t)(b->m * q->n);
+    cholmod_dense in = {.nrow = n, .ncol = 1, .nzmax = n, .d = n, .x = right, .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
+    if (!cholmod_solve2(CHOLMOD_A, b->factor, &in, NULL, &q->solution, NULL, &q->work_y, &q->work_e, &q->common))
+        return silt_fail(err, SILT_FAILED, "the stiff water's system could not be solved (CHOLMOD status %d)", q->common.status);
+    memcpy(right, q->solution->x, n * sizeof *right);
+    return SILT_OK;
+}
+
+silt_status silt_stiff_momentum(silt_stiff *q, const silt_fluid *f, const double *right, double *out, silt_error *err) {
+    memcpy(out, right, (size_t)(2 * q->n) * sizeof *out);
+    SILT_TRY(solve(q, &q->velocity, out, err));
+    for (int i = 0; i < q->n; i++)
+        silt_hold_project(f, i, out + 2 * i);
+    return SILT_OK;
+}
+
+silt_status silt_stiff_correct(silt_stiff *q, const silt_fluid *f, const double *right, double *increment, double *v, silt_error *err) {
+    for (int i = 0; i < q->n; i++) {
+        q->right[3 * i] = q->right[3 * i + 1] = 0;
+        q->right[3 * i + 2] = -right[i];
+    }
+    SILT_TRY(solve(q, &q->saddle, q->right, err));
+    for (int i = 0; i < q->n; i++) {
+        double dv[3] = {q->right[3 * i], q->right[3 * i + 1], 0};
+        silt_hold_project(f, i, dv);
+        v[2 * i] += dv[0];
+        v[2 * i + 1] += dv[1];
+        increment[i] = q->right[3 * i + 2];
+    }
+    return SILT_OK;
+}
