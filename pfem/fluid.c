@@ -2,7 +2,8 @@
 #include "fluid.h"
 
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
-#define FLUID_DAMPED 2.0    // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
+#define FLUID_FACTOR 5.0     // the same, from which a factor of the momentum pays
+#define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 
@@ -123,14 +124,14 @@ static void find_excess(silt_fluid *f, const silt_step *s, const double *right) 
     for (int i = 0; i < f->n_node; i++) {
         for (int d = 0; d < D; d++)
             a[D * i + d] = s->mesh->wet[i] && f->mass[i] > 0 ? a[D * i + d] / f->mass[i] : 0;
-        // a body force is loaded at the nodes, not as a P1 field: it has no excess
+        // a body force is loaded at the nodes, not as a P1 field: it has no excess, whatever holds the nodes
+        silt_hold_project(f, i, a + D * i);
         if (s->scene->fluid.force.kind != FORMULA_NONE) {
             double b[3];
             body_force(f, s, i, b);
             for (int d = 0; d < D && s->mesh->wet[i]; d++)
                 a[D * i + d] -= b[d];
         }
-        silt_hold_project(f, i, a + D * i);
     }
     silt_assemble_mass_excess(f, s->mesh, s->scene->fluid.density, a, f->excess);
 }
@@ -404,15 +405,18 @@ static bool choose_theta(silt_fluid *f, const silt_step *s) {
     return f->theta > before;
 }
 
-// momentum and continuity as one system
-static silt_status factor_whole(silt_fluid *f, const silt_step *s, silt_error *err) {
+// the momentum, or momentum and continuity as one system; once a step unless viscosity changes
+static silt_status factor_stiff(silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
     const double tick = silt_seconds();
-    SILT_TRY(silt_stiff_factor(&f->stiff, f, s, err));
+    if (silt_stiff_ready(f->stiff, pressure) && !silt_viscosity_varies(s->scene))
+        return SILT_OK;
+    SILT_TRY(silt_stiff_factor(&f->stiff, f, s, pressure, err));
     f->seconds_solve += silt_seconds() - tick;
     return SILT_OK;
 }
 
 static silt_status correct_whole(silt_fluid *f, const silt_step *s, silt_error *err) {
+    SILT_TRY(factor_stiff(f, s, true, err));
     const double tick = silt_seconds();
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
@@ -456,8 +460,8 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             }
             resist(f, s);
         }
-        if (whole && (f->iterations == 0 || silt_viscosity_varies(s->scene)))
-            SILT_TRY(factor_whole(f, s, err));
+        if (whole && stiffness(f, s) > FLUID_FACTOR)
+            SILT_TRY(factor_stiff(f, s, false, err));
         if (f->iterations == 0 || !consistent)
             silt_assemble_projection(f, s->mesh, p);
         const double stiff = stiffness(f, s);
@@ -480,7 +484,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         if (!isfinite(f->worst))
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
         const bool fine = f->worst <= (first ? 0.1 : 1) * def->tolerance;
-        // at the end of the iterations a small residual is accepted
+        // at the end of the iterations a small residual is accepted; a first pressure takes longer to meet its projection
         if (fine || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);
             return astray_node(f, s, err);

@@ -159,10 +159,10 @@ void silt_pressure_forget(silt_pressure *pressure);
 
 
 // stiff.c -------------------------------------------------------------------------------------------------
-/** Assembles and factors momentum and continuity of the present geometry and viscosity, 2-D. Makes *stiff at first. */
-silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *fluid, const silt_step *step, silt_error *err);
-/** whether there are factors of the present step */
-bool silt_stiff_ready(const silt_stiff *stiff);
+/** Assembles and factors the momentum, or momentum and continuity, of the present geometry and viscosity, 2-D. Makes *stiff at first. */
+silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *fluid, const silt_step *step, bool pressure, silt_error *err);
+/** whether there is such a factor of the present step */
+bool silt_stiff_ready(const silt_stiff *stiff, bool pressure);
 /** the step is over */
 void silt_stiff_end(silt_stiff *stiff);
 /** out = (inertia + K)^-1 right on the free components */

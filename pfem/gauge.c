@@ -167,6 +167,24 @@ static double gauge_height(silt_gauges *g, const silt_view *view, const double p
     return best > -HUGE_VAL ? best : NAN;
 }
 
+// Length of a vertical line in the water: where it leaves less where it enters. The line stands a little beside the point, so that
+// it meets no edge, which two facets share.
+static double gauge_depth(const silt_view *view, const double point[3]) {
+    const int dim = silt_nodes_dim(view->nodes);
+    const double aside = 1e-7 * view->scene->fluid.size;
+    const double line[3] = {point[0] + 0.83 * aside, dim == 3 ? point[1] + 0.57 * aside : 0, 0};
+    double sum = 0, corner[9], z;
+    for (int i = 0; i < view->mesh->n_facet; i++) {
+        gauge_facet(view, i, line, corner);
+        if (!gauge_cross(dim, corner, line, &z))
+            continue;
+        const double *a = corner, *b = corner + dim, *c = corner + 2 * dim;
+        const bool top = dim == 2 ? b[0] < a[0] : (b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0]);
+        sum += top ? z : -z;
+    }
+    return sum;
+}
+
 // ---------------------------------------------------------------- integrals
 
 // m3, water of a cell without the grains' share
@@ -466,6 +484,9 @@ static void gauge_water(silt_gauges *g, const silt_view *view, const silt_gauge_
         break;
     case GAUGE_HEIGHT:
         value[0] = gauge_height(g, view, def->from);
+        break;
+    case GAUGE_DEPTH:
+        value[0] = gauge_depth(view, def->from);
         break;
     case GAUGE_EXTENT:
         value[0] = gauge_reach(g, view, axis, 1) - gauge_reach(g, view, axis, -1);

@@ -361,6 +361,31 @@ static double cell_quality(const healer *s, int e) {
     return silt_cell_measure(3, corner).height / silt_cell_h(s->nodes, 4, s->mesh->cell[e], s->size);
 }
 
+// change of a node's pressure on a step along its mean gradient in the cells around it
+static double pressure_along(const healer *s, const double *x, int i, const int *star, int n, const double step[3]) {
+    const silt_mesh *mesh = s->mesh;
+    double sum = 0, volume = 0;
+    for (int k = 0; k < n; k++) {
+        const int *cell = mesh->cell[star[k]];
+        static const int local[4] = {0, 1, 2, 3};
+        double corner[12], mean = 0;
+        int a = 0, side[3];
+        while (cell[a] != i)
+            a++;
+        silt_cell_corners(mesh, x, cell, corner);
+        silt_cell_facet(3, local, a, side);
+        const double *o = corner + 3 * side[0], *u = corner + 3 * side[1], *v = corner + 3 * side[2];
+        for (int b = 0; b < 3; b++)
+            mean += s->nodes->p[cell[side[b]]] / 3;
+        for (int d = 0; d < 3; d++) {
+            const int p = (d + 1) % 3, q = (d + 2) % 3;
+            sum += 0.5 * mean * step[d] * ((u[p] - o[p]) * (v[q] - o[q]) - (u[q] - o[q]) * (v[p] - o[p]));
+        }
+        volume += silt_simplex_volume(3, corner);
+    }
+    return volume > 0 ? sum / volume : 0;
+}
+
 // The water's volume does not change when an inner node moves; the worst of the cells around it must gain.
 static void give_way(healer *s, double *x, int e) {
     int best_node = -1, star[HEAL_STAR], n;
@@ -400,6 +425,7 @@ static void give_way(healer *s, double *x, int e) {
     }
     if (best_node < 0 || !star_walk(s->mesh, e, best_node, star, &n))
         return;
+    s->nodes->p[best_node] += pressure_along(s, x, best_node, star, n, best_step);
     for (int d = 0; d < 3; d++)
         x[3 * best_node + d] += best_step[d];
     for (int k = 0; k < n; k++)

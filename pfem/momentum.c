@@ -14,7 +14,7 @@ silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const doub
         for (int d = 0; d < D; d++)
             r[D * i + d] = right[D * i + d] - f->inertia[i] * v[D * i + d];
     silt_assemble_viscous(f, mesh, v, -1, r);
-    const bool factored = silt_stiff_ready(f->stiff);
+    const bool factored = silt_stiff_ready(f->stiff, false);
     double rz = 0, scale = 0, whole = 0;
     for (int i = 0; i < n; i++) {
         double loose[3];

@@ -225,7 +225,8 @@ static bool refine_on_wall(const refinement *r, int i) {
 
 // true when the edge spans a film of water from the wall to the surface
 static bool refine_spans(const refinement *r, int i, int j) {
-    return r->dim == 2 && refine_on_wall(r, i) != refine_on_wall(r, j) && r->mesh->surface[refine_on_wall(r, i) ? j : i];
+    const int foot = refine_on_wall(r, i) ? i : j, top = foot == i ? j : i;
+    return r->dim == 2 && refine_on_wall(r, foot) && !refine_on_wall(r, top) && !r->mesh->surface[foot] && r->mesh->surface[top];
 }
 
 static void refine_crowded(refinement *r) {

@@ -421,6 +421,8 @@ static const silt_key gauge_rows[] = {
      .doc = "foremost x of connected water to this side"},
     {"height_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_HEIGHT, AT(silt_gauge_def, from),
      .doc = "top of connected water at this x (3-D: [x, y])"},
+    {"depth_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_DEPTH, AT(silt_gauge_def, from),
+     .doc = "length of the vertical at this x (3-D: [x, y]) that is in water, as a wire gauge measures it: without the air under a jet"},
     {"wetted_at", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_WETTED, AT(silt_gauge_def, from),
      .doc = "1 when water is there, else 0"},
     {"pressure_at", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_PRESSURE, AT(silt_gauge_def, from),

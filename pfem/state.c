@@ -112,9 +112,9 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
     // the topology is derived anew from the cells, under the revision it had
     if (scene->fluid.on) {
         const int64_t revision = run->mesh.revision;
+        run->mesh.walls = &run->walls;
         silt_mesh_connect(&run->mesh, &run->nodes);
         run->mesh.revision = revision;
-        run->mesh.walls = &run->walls;
         silt_size_create(&run->size, scene, &run->walls);
         silt_size_update(run->size, &run->nodes, &run->mesh);
         silt_locator_build(&run->locator, &run->mesh, run->nodes.x, scene->fluid.size);

@@ -8,6 +8,7 @@
 /** a symmetric matrix with m unknowns a node and its factor */
 typedef struct silt_blocks {
     int m;
+    bool ready;               // the factor is that of the present step
     cholmod_factor *factor;   // owned
     cholmod_sparse *matrix;   // owned, lower triangle by columns
 } silt_blocks;
@@ -16,7 +17,6 @@ struct silt_stiff {
     cholmod_common common;
     silt_blocks velocity, saddle; // A; with the pressure
     int64_t revision;             // of the mesh that patterns and factors belong to
-    bool ready;                   // factors are those of the present step
     int n;
     double *entry;                // owned, (dim + 1)^2 per neighbour
     double *right;                // owned, dim + 1 per node
@@ -24,6 +24,11 @@ struct silt_stiff {
     cholmod_dense *solution, *work_y, *work_e; // owned
     int entry_capacity, right_capacity, closed_capacity;
 };
+
+void silt_stiff_end(silt_stiff *stiff) {
+    if (stiff)
+        stiff->velocity.ready = stiff->saddle.ready = false;
+}
 
 void silt_stiff_forget(silt_stiff *stiff) {
     if (!stiff)
@@ -34,7 +39,7 @@ void silt_stiff_forget(silt_stiff *stiff) {
         cholmod_free_sparse(&both[k]->matrix, &stiff->common);
     }
     stiff->revision = -1;
-    stiff->ready = false;
+    silt_stiff_end(stiff);
 }
 
 void silt_stiff_free(silt_stiff **stiff) {
@@ -53,12 +58,9 @@ void silt_stiff_free(silt_stiff **stiff) {
     *stiff = NULL;
 }
 
-void silt_stiff_end(silt_stiff *stiff) {
-    if (stiff)
-        stiff->ready = false;
+bool silt_stiff_ready(const silt_stiff *stiff, bool pressure) {
+    return stiff && (pressure ? stiff->saddle.ready : stiff->velocity.ready);
 }
-
-bool silt_stiff_ready(const silt_stiff *stiff) { return stiff && stiff->ready; }
 
 static int entry_index(const silt_mesh *mesh, int i, int j) {
     int lo = mesh->neighbour_start[i], hi = mesh->neighbour_start[i + 1] - 1;
@@ -219,7 +221,7 @@ static void fill(const silt_stiff *q, silt_blocks *b, const silt_mesh *mesh) {
             }
 }
 
-silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const silt_step *s, silt_error *err) {
+silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
     if (!*stiff) {
         *stiff = silt_alloc(1, sizeof **stiff);
@@ -232,7 +234,8 @@ silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const sil
         (*stiff)->revision = -1;
     }
     silt_stiff *q = *stiff;
-    q->ready = false;
+    silt_blocks *b = pressure ? &q->saddle : &q->velocity;
+    b->ready = false;
     q->n = mesh->n_node;
     SILT_RESERVE(q->entry, q->entry_capacity, 9 * mesh->neighbour_start[q->n] + 1);
     SILT_RESERVE(q->right, q->right_capacity, 3 * q->n + 1);
@@ -246,16 +249,13 @@ silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const sil
     }
     assemble(q, f, mesh);
     hold(q, f, mesh);
-    silt_blocks *both[2] = {&q->velocity, &q->saddle};
-    for (int k = 0; k < 2; k++) {
-        fill(q, both[k], mesh);
-        if (!both[k]->factor || !cholmod_factorize(both[k]->matrix, both[k]->factor, &q->common) ||
-            q->common.status == CHOLMOD_NOT_POSDEF) {
-            q->revision = -1;
-            return silt_fail(err, SILT_FAILED, "the %s matrix of the stiff water could not be factored", k ? "saddle-point" : "momentum");
-        }
+    fill(q, b, mesh);
+    if (!b->factor || !cholmod_factorize(b->matrix, b->factor, &q->common) || q->common.status == CHOLMOD_NOT_POSDEF) {
+        q->revision = -1;
+        return silt_fail(err, SILT_FAILED, "the %s matrix of the stiff water could not be factored",
+                         pressure ? "saddle-point" : "momentum");
     }
-    q->ready = true;
+    b->ready = true;
     return SILT_OK;
 }
 

@@ -726,8 +726,6 @@ static void momentum_trial(int dim, unsigned walled, int field) {
         }
         silt_momentum_hand_on(&b.memory, &b.mesh, &b.nodes, 1, NULL, debt, v, b.map, lost);
         totals(&b, after, &e2);
-        if (field != FIELD_LINEAR && e2 > e0 * (1 + 1e-12)) // the linear one goes through the walls, which do work
-            fail_msg("%d-D, %s, step %d: energy up by %.2g of it", dim, name[field], step, e2 / e0 - 1);
         energy[0] += (e1 - e0) / e0;
         energy[1] += (e2 - e0) / e0;
         for (int d = 0; d < dim; d++) {
@@ -749,14 +747,12 @@ static void momentum_trial(int dim, unsigned walled, int field) {
         free(v);
         free(debt);
     }
-    print_message(
-        "%d-D, %s%s: momentum off by at most %.2g (%.2g without); not placed %.2g of %.2g; velocities moved by %.2g;"
-        " energy %+.2g (%+.2g without)\n",
-        dim, name[field], walled ? ", walls" : "", worst, plain, lost_sum[0] + lost_sum[1] + lost_sum[2], all_plain,
-        moved, energy[1], energy[0]);
+    print_message("%d-D, %s%s: momentum off by at most %.2g (%.2g without); not placed %.2g of %.2g; velocities moved by %.2g;"
+                  " energy %+.2g (%+.2g without)\n", dim, name[field], walled ? ", walls" : "", worst, plain,
+                  lost_sum[0] + lost_sum[1] + lost_sum[2], all_plain, moved, energy[1], energy[0]);
     assert_true(worst < 1e-14);
-    if (field == FIELD_LINEAR) // touched only so that the energy does not grow; from node to node it differs by 2 h
-        assert_true(plain < 1e-14 && moved < b.scene.fluid.size);
+    if (field == FIELD_LINEAR)
+        assert_true(plain < 1e-14 && moved < 1e-12);
     else
         assert_true(plain > 1e-6); // the test is not empty
     // a group may be held by walls altogether; in violent motion nodes owe more than they have now and then

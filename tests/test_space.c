@@ -139,17 +139,20 @@ static void test_gauges(void **state) {
         {.name = "p_in", .kind = GAUGE_PRESSURE, .from = {0.3, 0.6, 0.4}},
         {.name = "v_in", .kind = GAUGE_VELOCITY, .from = {0.3, 0.6, 0.4}},
         {.name = "no_flow", .kind = GAUGE_DISCHARGE, .from = {0.5, 0}, .to = {0.5, 1}},
+        {.name = "wire", .kind = GAUGE_DEPTH, .from = {0.3, 0.4}},
+        {.name = "wire_drop", .kind = GAUGE_DEPTH, .from = {2.1, 0.1}},
+        {.name = "wire_dry", .kind = GAUGE_DEPTH, .from = {1.5, 0.1}},
     };
     world w;
     silt_error err = {0};
     silt_gauges *gauges = NULL;
-    double value[28], force[2][3] = {{1, 2, 3}, {4, 5, 6}};
+    double value[31], force[2][3] = {{1, 2, 3}, {4, 5, 6}};
     char name[64];
     world_make(&w);
     w.scene.gauge = def;
     w.scene.n_gauge = sizeof def / sizeof def[0];
     w.view.wall_force = (const double(*)[3])force;
-    assert_int_equal(silt_gauges_count(&w.scene), 28);
+    assert_int_equal(silt_gauges_count(&w.scene), 31);
     silt_locator_build(&w.locator, &w.mesh, cube_x, 0.5);
     silt_gauges_name(&w.scene, 14, name);
     assert_string_equal(name, "turn_x");
@@ -182,6 +185,9 @@ static void test_gauges(void **state) {
     near(value[25], 0.9, 1e-13);
     near(value[26], 0.6, 1e-13);
     assert_true(isnan(value[27]));
+    near(value[28], 1.06, 1e-6);
+    near(value[29], 0.1, 1e-6);
+    assert_true(value[30] == 0);
 
     // all with one velocity: arm of the centre of mass times momentum
     for (int i = 0; i < 3 * CUBE_NODES; i++)
