@@ -9,14 +9,14 @@
 #define REFINE_SHAPE 0.01   // less than this times h^dim comes or goes with the node
 #define REFINE_FLAT 0.25    // a node nearer to a wall than this times h is pressed out
 #define REFINE_UNDER 0.1    // in space a node from within nearer than this times h to the free surface: slivers would follow, and go
-#define REFINE_ROOM 0.6     // but none nearer than this times h to another; on the boundary
-#define REFINE_RIM 0.36     // this: an edge of the surface that is not split tears; what is less dear than its node leaves
-#define REFINE_MEET 0.15
+#define REFINE_CREASE 1.5   // edges along creases that are longer than this times h get nodes
+#define REFINE_ROOM 0.6     // but no node comes inside nearer than this times h to another
+#define REFINE_MEET 0.15    // on the boundary what is less dear may be as near as this times h: it leaves
 #define REFINE_PIECES 4     // into which an edge is split at most
-// Edges longer than this times h get nodes, those of the surface and those inside: with less the cloud grows denser than h in
-// strong strain, and the diagonals of a lattice's faces in space would be split. Creases at 1.5.
-static const double refine_taut[4] = {0, 0, 1.5, 1.7}, refine_slack[4] = {0, 0, 1.6, 1.7};
-#define REFINE_CREASE 1.5
+// by the dimension, times h: edges of the surface and those inside get nodes when longer (with less the cloud grows denser than
+// h in strong strain, and in space the diagonals of a lattice's faces would be split); room for a node on the boundary, where
+// an edge that is not split tears
+static const double refine_taut[4] = {0, 0, 1.5, 1.7}, refine_slack[4] = {0, 0, 1.6, 1.7}, refine_rim[4] = {0, 0, 0.36, 0.5};
 // Water on a plane wall runs out in a thin wedge, which has nodes down to this thickness times h: with fewer the wedge ends
 // in a step, water falls into it, and what is cut off and paid back there keeps the shore in motion for ever. 2-D only.
 #define REFINE_WEDGE 0.1
@@ -85,7 +85,7 @@ typedef struct refinement {
     const silt_walls *walls;
     int dim;
     double h; // fluid.size
-    uint8_t *locked;
+    uint8_t *locked, *long_edge; // one per node: has an edge that may be too long
     int *facet_start, *facet; // boundary facets of every node
     candidate *list;
     int n, capacity;
@@ -231,16 +231,27 @@ static bool refine_spans(const refinement *r, int i, int j) {
 
 static void refine_crowded(refinement *r) {
     const silt_mesh *mesh = r->mesh;
+    const bool periodic = mesh->period[0] > 0 || mesh->period[1] > 0 || mesh->period[2] > 0;
     r->n = 0;
-    for (int i = 0; i < mesh->n_node; i++)
+    for (int i = 0; i < mesh->n_node; i++) {
+        const double *p = r->nodes->x + r->dim * i;
         for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++) {
             const int j = mesh->neighbour[k];
-            if (j <= i || r->locked[i] || r->locked[j])
+            if (j <= i)
                 continue;
-            const double ratio = refine_length(r, i, j) / refine_h(r, i, j);
-            if (ratio < (refine_spans(r, i, j) ? REFINE_WEDGE : REFINE_CROWDED))
+            // most edges are neither: no root for them
+            const double *q = r->nodes->x + r->dim * j, h = refine_h(r, i, j);
+            double square = silt_square(q[0] - p[0]) + silt_square(q[1] - p[1]);
+            square += r->dim == 3 ? silt_square(q[2] - p[2]) : 0;
+            if (!periodic && square > silt_square(1.001 * REFINE_CROWDED * h) && square < silt_square(0.999 * REFINE_CREASE * h))
+                continue;
+            const double ratio = refine_length(r, i, j) / h;
+            if (ratio >= REFINE_CREASE)
+                r->long_edge[i] = r->long_edge[j] = 1;
+            if (ratio < REFINE_CROWDED && !r->locked[i] && !r->locked[j] && (ratio < REFINE_WEDGE || !refine_spans(r, i, j)))
                 refine_propose(r, -ratio, i, j, -1);
         }
+    }
     refine_sort(r);
     for (int c = 0; c < r->n; c++) {
         const int i = r->list[c].a, j = r->list[c].b;
@@ -447,7 +458,7 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
     int element;
     if (wedge && !n_wall && r->walls && silt_walls_distance(r->walls, x, &element) < REFINE_FRESH * h)
         return;
-    if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : REFINE_RIM) * h, rank, h, wedge))
+    if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : refine_rim[dim]) * h, rank, h, wedge))
         return;
     const int i = silt_nodes_add(nodes, NODE_FLUID, -1, x);
     for (int c = 0; c < dim; c++)
@@ -501,12 +512,19 @@ static void refine_propose_long(refinement *r) {
     int edge[2] = {0, 0};
     r->n = 0;
     for (int e = 0; e < r->mesh->n_cell; e++) {
+        int ends = 0;
+        for (int a = 0; a <= r->dim; a++)
+            ends += r->long_edge[r->mesh->cell[e][a]];
+        if (ends < 2)
+            continue;
         const double most = refine_longest(r, r->dim + 1, r->mesh->cell[e], edge);
         if (most >= (surface[edge[0]] && surface[edge[1]] ? refine_taut[r->dim] : refine_slack[r->dim]))
             refine_propose(r, most, edge[0], edge[1], -1);
     }
     for (int k = 0; k < r->mesh->n_facet && r->dim == 3; k++) {
         const int *facet = r->mesh->facet[k];
+        if (r->long_edge[facet[0]] + r->long_edge[facet[1]] + r->long_edge[facet[2]] < 2)
+            continue;
         const double most = refine_longest(r, 3, facet, edge);
         if (most < REFINE_CREASE)
             continue;
@@ -576,6 +594,7 @@ static void refine_stretched(refinement *r) {
 void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h) {
     refinement r = {.mesh = mesh, .nodes = nodes, .memory = memory, .walls = mesh->walls, .dim = silt_nodes_dim(nodes), .h = h};
     r.locked = silt_alloc((size_t)mesh->n_node + 1, 1);
+    r.long_edge = silt_alloc((size_t)mesh->n_node + 1, 1);
     for (int i = 0; i < mesh->n_node; i++)
         r.locked[i] = memory->dead[i];
     refine_facets(&r);
@@ -586,6 +605,7 @@ void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *mem
     free(r.facet);
     free(r.list);
     free(r.locked);
+    free(r.long_edge);
 }
 
 // ---- a test of remeshing
