@@ -376,3 +376,15 @@ silt_cell_shape silt_cell_measure(int dim, const double *corner) {
     return (silt_cell_shape){six / 6, six > 0 ? sqrt(dot(centre, centre)) / (2 * six) : HUGE_VAL,
                              largest > 0 ? six / sqrt(largest) : 0};
 }
+
+int silt_neighbour_index(const silt_mesh *mesh, int i, int j) {
+    int lo = mesh->neighbour_start[i], hi = mesh->neighbour_start[i + 1] - 1;
+    while (lo < hi) {
+        const int mid = (lo + hi) / 2;
+        if (mesh->neighbour[mid] < j)
+            lo = mid + 1;
+        else
+            hi = mid;
+    }
+    return lo;
+}

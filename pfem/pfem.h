@@ -198,6 +198,8 @@ void silt_cell_facet(int dim, const int *cell, int a, int facet[3]);
 /** true when the nodes share a patch of the mesh's walls */
 bool silt_mesh_share(const silt_mesh *mesh, const silt_nodes *nodes, int n, const int *node);
 void silt_mesh_clear(silt_mesh *mesh);
+/** where the neighbour j of node i stands in mesh->neighbour */
+int silt_neighbour_index(const silt_mesh *mesh, int i, int j);
 double silt_cell_area(const double *x, const int *cell); // 2-D
 /** m2 or m3 of a triangle or tetrahedron from its corners, dim numbers each */
 double silt_simplex_volume(int dim, const double *corner);

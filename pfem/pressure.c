@@ -81,19 +81,6 @@ void silt_pressure_free(silt_pressure **pressure) {
     *pressure = NULL;
 }
 
-// position of node j in the neighbour list of i
-static int neighbour_index(const silt_mesh *mesh, int i, int j) {
-    int lo = mesh->neighbour_start[i], hi = mesh->neighbour_start[i + 1] - 1;
-    while (lo < hi) {
-        const int mid = (lo + hi) / 2;
-        if (mesh->neighbour[mid] < j)
-            lo = mid + 1;
-        else
-            hi = mid;
-    }
-    return lo;
-}
-
 // pieces of water without a free surface know their pressure up to a constant: one node each is pinned
 static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     SILT_RESERVE(p->pinned, p->pinned_capacity, mesh->n_node + 1);
@@ -125,11 +112,11 @@ static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh
         SILT_RESERVE(p->place, p->place_capacity, m * m * mesh->n_cell + 1);
         for (int i = 0; i < n; i++)
             for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++)
-                p->mirror[k] = neighbour_index(mesh, mesh->neighbour[k], i);
+                p->mirror[k] = silt_neighbour_index(mesh, mesh->neighbour[k], i);
         for (int e = 0; e < mesh->n_cell; e++)
             for (int a = 0; a < m; a++)
                 for (int b = 0; b < m; b++)
-                    p->place[m * m * e + m * a + b] = neighbour_index(mesh, mesh->cell[e][a], mesh->cell[e][b]);
+                    p->place[m * m * e + m * a + b] = silt_neighbour_index(mesh, mesh->cell[e][a], mesh->cell[e][b]);
     }
 
     // count, then fill

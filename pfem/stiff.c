@@ -63,18 +63,6 @@ bool silt_stiff_ready(const silt_stiff *stiff, bool pressure) {
     return stiff && (pressure ? stiff->saddle.ready : stiff->velocity.ready);
 }
 
-static int entry_index(const silt_mesh *mesh, int i, int j) {
-    int lo = mesh->neighbour_start[i], hi = mesh->neighbour_start[i + 1] - 1;
-    while (lo < hi) {
-        const int mid = (lo + hi) / 2;
-        if (mesh->neighbour[mid] < j)
-            lo = mid + 1;
-        else
-            hi = mid;
-    }
-    return lo;
-}
-
 // pattern of m unknowns a node, and the order of elimination from that of the nodes
 static void pattern(silt_stiff *q, silt_blocks *b, const silt_mesh *mesh, int m, const int *order) {
     const int n = mesh->n_node;
@@ -161,7 +149,7 @@ static void assemble(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh) 
         const double viscous = f->mu[e] * f->inverse[e], smooth = f->tau[e] * f->inverse[e];
         for (int a = 0; a < M; a++)
             for (int b = 0; b < M; b++) {
-                double *out = q->entry + M * M * entry_index(mesh, cell[a], cell[b]);
+                double *out = q->entry + M * M * silt_neighbour_index(mesh, cell[a], cell[b]);
                 const double *fa = flux + D * a, *fb = flux + D * b, along = fa[0] * fb[0] + fa[1] * fb[1];
                 for (int d = 0; d < D; d++) {
                     for (int k = 0; k < D; k++)

@@ -6,19 +6,7 @@
 #include <unistd.h>
 
 #include "pfem.h"
-
-static silt_scene *scene_of(const char *text) {
-    char path[] = "/tmp/silt-seed-XXXXXX";
-    const int fd = mkstemp(path);
-    assert_true(fd >= 0 && write(fd, text, strlen(text)) == (ssize_t)strlen(text));
-    close(fd);
-    silt_scene *scene = NULL;
-    silt_error err = {0};
-    if (silt_scene_read(path, 0, NULL, &scene, &err) != SILT_OK)
-        fail_msg("%s", err.text);
-    unlink(path);
-    return scene;
-}
+#include "scene_text.h"
 
 #define HEAD2 "silt: 1\ndimension: 2\ntime: {end: 1, output: 1}\ngravity: [0, -9.81]\n"
 #define HEAD3 "silt: 1\ndimension: 3\ntime: {end: 1, output: 1}\ngravity: [0, 0, -9.81]\n"
