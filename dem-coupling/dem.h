@@ -6,7 +6,7 @@
 #ifndef SILT_DEM_H
 #define SILT_DEM_H
 
-#include "../pfem/pfem.h"
+#include "pfem.h"
 
 typedef struct silt_dem silt_dem; // opaque, owns the worker and the shared memory
 

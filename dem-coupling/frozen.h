@@ -5,7 +5,7 @@
 #ifndef SILT_FROZEN_H
 #define SILT_FROZEN_H
 
-#include "../pfem/bed.h"
+#include "bed.h"
 
 typedef struct silt_frozen_sphere {
     int64_t id;

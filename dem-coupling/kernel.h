@@ -6,7 +6,7 @@
 #ifndef SILT_KERNEL_H
 #define SILT_KERNEL_H
 
-#include "../pfem/pfem.h"
+#include "pfem.h"
 
 typedef struct silt_kernel {
     int n_node, n_cell;

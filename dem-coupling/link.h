@@ -5,7 +5,7 @@
 #ifndef SILT_LINK_H
 #define SILT_LINK_H
 
-#include "../pfem/base.h"
+#include "base.h"
 #include "protocol.h"
 
 #include <sys/types.h>

@@ -5,7 +5,7 @@
 #ifndef SILT_SHAPE_H
 #define SILT_SHAPE_H
 
-#include "../pfem/scene.h"
+#include "scene.h"
 
 typedef struct silt_outline {
     int n_point;

@@ -4,7 +4,7 @@
 #ifndef SILT_STATE_H
 #define SILT_STATE_H
 
-#include "../pfem/coupling.h"
+#include "coupling.h"
 
 #include "dem.h"
 #include "exchange.h"

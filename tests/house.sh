@@ -31,13 +31,13 @@ while read -r file; do
 
     # C++ only where CGAL is included
     case $file in
-    pfem/delaunay.cpp) ;;
-    *.cpp | *.cc | *.cxx | *.hpp | *.hh | *.hxx) breach "$file: C++ belongs in pfem/delaunay.cpp alone" ;;
+    pfem/mesh/delaunay.cpp) ;;
+    *.cpp | *.cc | *.cxx | *.hpp | *.hh | *.hxx) breach "$file: C++ belongs in pfem/mesh/delaunay.cpp alone" ;;
     esac
 
     # the library never ends the program (but base.c when no memory is left); the worker is a program
     case $file in
-    pfem/main.c | pfem/base.c | dem-coupling/worker.c | dem-coupling/script.c) ;;
+    pfem/run/main.c | pfem/base.c | dem-coupling/worker.c | dem-coupling/script.c) ;;
     pfem/*.c | dem-coupling/*.c)
         if grep -nE '(^|[^[:alnum:]_])(exit|abort) ?\(' "$file"; then
             breach "$file ends the program: a library function returns a status"

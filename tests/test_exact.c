@@ -8,7 +8,7 @@
 #include <cmocka.h>
 
 // the loop's own functions
-#include "../pfem/run.c"
+#include "../pfem/run/run.c"
 
 #include <dirent.h>
 #include <sys/stat.h>

@@ -2,8 +2,8 @@
 // clumps; and through the worker: a grain in dry space, release, deposit, checkpoint
 #include "../dem-coupling/exchange.h"
 #include "../dem-coupling/shape.h"
-#include "../pfem/coupling.h"
-#include "../pfem/fluid.h"
+#include "coupling.h"
+#include "fluid.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 // a grain settles in still water, by whole runs of cases/settling-grain: terminal velocity at d/h = 0.1, 0.5 and 2, what
 // the grain gains and loses step by step, rest on the floor, stiff drag; and with the loop's parts: momentum of the water
-#include "../pfem/run.h"
+#include "run.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -417,7 +417,7 @@ static void help_section(FILE *to, const silt_key_table *table, const char *path
 void silt_scene_document(FILE *to) {
     fprintf(to,
             "# Keys of a scene\n\n"
-            "This page is made from the table in `pfem/scene_keys.c`; `silt help KEY` prints the same.\n\n"
+            "This page is made from the table in `pfem/scene/scene_keys.c`; `silt help KEY` prints the same.\n\n"
             "A scene is a YAML 1.2 (or JSON) file. Units are SI, angles in degrees. Points have two numbers "
             "[x, y], y up, in two dimensions (a third one must be 0) and three\n[x, y, z], z up, in three. Physical "
             "properties have no default, numerical ones have one. Of the keys marked \"one of\" "
