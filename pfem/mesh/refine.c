@@ -127,11 +127,13 @@ static void refine_remove(refinement *r, int i) {
 
 // how dear a node is: the dearer of two crowded ones stays; from 8 on none leaves
 static int refine_rank(const refinement *r, int i) {
-    if (r->nodes->kind[i] != NODE_FLUID)
-        return 9;
     int n_wall = 0;
     for (int s = 0; s < 3; s++)
         n_wall += r->nodes->wall[i][s] >= 0;
+    if (r->nodes->kind[i] == NODE_OPEN)
+        return n_wall >= r->dim - 1 ? 9 : r->mesh->surface[i] ? 7 : 5 + n_wall;
+    if (r->nodes->kind[i] != NODE_FLUID)
+        return 9;
     if (n_wall >= r->dim)
         return 8; // fills a corner
     return (n_wall == 2 ? 4 : n_wall) + (r->mesh->surface[i] ? 2 : 0);
@@ -460,7 +462,8 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
         return;
     if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : refine_rim[dim]) * h, rank, h, wedge))
         return;
-    const int i = silt_nodes_add(nodes, NODE_FLUID, -1, x);
+    const bool open = !closed && nodes->kind[a] == NODE_OPEN && nodes->kind[b] == NODE_OPEN && nodes->owner[a] == nodes->owner[b];
+    const int i = silt_nodes_add(nodes, open ? NODE_OPEN : NODE_FLUID, open ? nodes->owner[a] : -1, x);
     for (int c = 0; c < dim; c++)
         nodes->v[dim * i + c] = (1 - share) * nodes->v[dim * a + c] + share * nodes->v[dim * b + c];
     nodes->p[i] = (1 - share) * nodes->p[a] + share * nodes->p[b];
@@ -564,8 +567,8 @@ static void refine_stretched(refinement *r) {
         const int a = r->list[c].a, b = r->list[c].b;
         if (c && r->list[c - 1].a == a && r->list[c - 1].b == b)
             continue;
-        // bed, bodies and inlets keep their own nodes
-        if (nodes->kind[a] != NODE_FLUID && nodes->kind[a] == nodes->kind[b])
+        // bed, bodies and inlets keep their own nodes; openings with a level do not
+        if (nodes->kind[a] != NODE_FLUID && nodes->kind[a] != NODE_OPEN && nodes->kind[a] == nodes->kind[b])
             continue;
         int around[64];
         bool closed, locked = false;

@@ -128,13 +128,10 @@ static void let_out(silt_run *run) {
         bool gone = false;
         for (int d = 0; d < D; d++)
             gone |= (run->mesh.period[d] <= 0 && (x[d] < run->box_lo[d] || x[d] > run->box_hi[d])) || !isfinite(x[d]);
-        for (int k = 0; D == 2 && k < run->scene->fluid.n_outlet && !gone; k++) {
-            const silt_outlet *outlet = &run->scene->fluid.outlet[k];
-            const double dx = outlet->to[0] - outlet->from[0], dy = outlet->to[1] - outlet->from[1];
-            const double side = dx * (x[1] - outlet->from[1]) - dy * (x[0] - outlet->from[0]);
-            const double before = dx * (old[1] - outlet->from[1]) - dy * (old[0] - outlet->from[0]);
-            const double along = (dx * (x[0] - outlet->from[0]) + dy * (x[1] - outlet->from[1])) / (dx * dx + dy * dy);
-            gone = side < 0 && before >= -1e-12 * (dx * dx + dy * dy) && along > -0.05 && along < 1.05;
+        for (int k = run->scene->fluid.n_inlet; k < silt_opening_count(run->scene) && !gone; k++) {
+            const silt_opening outlet = silt_opening_of(run->scene, k);
+            gone = silt_opening_height(&outlet, x) < 0 && silt_opening_height(&outlet, old) >= -1e-12 * outlet.size &&
+                   silt_opening_depth(&outlet, x) > -0.05 * outlet.size;
         }
         if (gone)
             run->memory.dead[i] = NODE_LEFT;

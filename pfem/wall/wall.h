@@ -88,6 +88,16 @@ void wall_sliding(const silt_walls *walls, int e, double v[3]);
 bool wall_given(const silt_walls *walls, int n, const int element[3], const double *const normal[3], const double own[3][3],
                 double out[3]);
 
+// wall_cut.c ------------------------------------------------------------------------------------------
+/** a part of an element, from the scene's place */
+typedef struct wall_piece {
+    double corner[3][3];
+    int source; // element that it is of
+} wall_piece;
+/** What is left of the elements, before they are joined, where openings through which the water's own motion carries it lie in
+ * them: outlets, and inlets with a head. @return how many pieces; *piece is owned by the caller */
+int wall_cut(const silt_walls *walls, const silt_scene *scene, wall_piece **piece);
+
 // surface.c -------------------------------------------------------------------------------------------
 /** a triangulated surface */
 typedef struct silt_surface {
