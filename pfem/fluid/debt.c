@@ -7,7 +7,7 @@ static double gravity_size(const silt_scene *scene) {
     return sqrt(silt_square(scene->gravity[0]) + silt_square(scene->gravity[1]) + silt_square(scene->gravity[2]));
 }
 
-// a piece of water without free surface can neither grow nor shrink: there debts only move
+// a piece of water without free surface or opening with a level can neither grow nor shrink: there debts only move
 static void keep_closed(silt_fluid *f, const silt_mesh *mesh) {
     int *parent = silt_alloc((size_t)f->n_node + 1, sizeof *parent);
     double *rate = silt_alloc((size_t)f->n_node + 1, sizeof *rate), *volume = silt_alloc((size_t)f->n_node + 1, sizeof *volume);
@@ -20,6 +20,9 @@ static void keep_closed(silt_fluid *f, const silt_mesh *mesh) {
         rate[r] += f->rate[i];
         volume[r] += mesh->surface[i] ? HUGE_VAL : f->volume[i];
     }
+    for (int k = 0; k < mesh->n_facet; k++)
+        if (mesh->facet_kind[k] == FACET_OPEN)
+            volume[silt_group_find(parent, mesh->facet[k][0])] = HUGE_VAL;
     for (int i = 0; i < f->n_node; i++) {
         const int r = silt_group_find(parent, i);
         if (isfinite(volume[r]) && volume[r] > 0)

@@ -8,7 +8,8 @@
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 
 void silt_fluid_clear(silt_fluid *f) {
-    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->inverse, f->mu, f->tau, f->share, f->belt, f->wall_force, f->shift, f->mass, f->volume,
+    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->inverse, f->mu, f->tau, f->share, f->belt, f->wall_force, f->shift, f->level_force, f->level_brake,
+                       f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
                        f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->normal, f->given, f->cg[0],
                        f->cg[1], f->cg[2]};
@@ -84,6 +85,11 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
             belts |= s->scene->wall[k].velocity[d] != 0;
     if (belts)
         SILT_RESERVE(f->belt, f->belt_capacity, D * n_node + 1);
+    if (silt_levels_any(s->scene)) {
+        SILT_RESERVE(f->level_force, f->level_capacity, D * n_node + 1);
+        SILT_RESERVE(f->level_brake, f->level_brake_capacity, n_node + 1);
+        memset(f->level_force, 0, (size_t)(D * n_node) * sizeof(double));
+    }
     if (s->scene->fluid.volume_control)
         SILT_RESERVE(f->shift, f->shift_capacity, D * n_node + 1);
     f->n_node = n_node;
@@ -153,6 +159,8 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
     if (f->law.n_point)
         for (int k = 0; k < D * f->n_node; k++)
             out[k] += f->wall_force[k];
+    for (int k = 0; f->level_force && k < D * f->n_node; k++)
+        out[k] += f->level_force[k];
     if (s->pockets)
         silt_pockets_force(s->pockets, D, 0.5 * s->dt, f->w, out);
     silt_assemble_pressure(f, s->mesh, p, out, NULL);
@@ -160,11 +168,14 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
 
 // resistance of the present iterate: traction of walls, then geometry, then viscosity of every cell
 static void resist(silt_fluid *f, const silt_step *s) {
-    if (f->law.n_point) {
+    if (f->law.n_point || f->level_force)
         memset(f->friction, 0, (size_t)f->n_node * sizeof *f->friction);
+    if (f->law.n_point) {
         memset(f->wall_force, 0, (size_t)(f->dim * f->n_node) * sizeof *f->wall_force);
         silt_wall_law_traction(&f->law, s->scene, f->dim, f->w, f->friction, f->wall_force);
     }
+    if (f->level_force)
+        silt_levels_load(f, s);
     silt_assemble_geometry(f, s, s->dt);
     if (silt_viscosity_varies(s->scene))
         silt_viscosity_update(s->scene, s->nodes, s->mesh, &f->depth, f->flux, f->inverse, f->w, f->iterations ? 0.5 : 1, f->mu,
@@ -337,6 +348,8 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
             const int k = D * i + d;
             out[k] -= loose[d];
             f->worked += dt * out[k] * f->w[k];
+            if (f->level_force)
+                f->worked += dt * (f->level_force[k] - f->level_brake[i] * f->w[k]) * f->w[k];
             unbalanced[d] += loose[d];
             f->momentum_scale += fabs(f->mass[i] * s->scene->gravity[d]) + fabs(f->inertia[i] * (f->w[k] - v[k]));
             if (drag) {

@@ -26,7 +26,7 @@ typedef struct silt_step {
 
 /** working space and results of a step; arrays grow only */
 typedef struct silt_fluid {
-    int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity;
+    int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity, level_capacity, level_brake_capacity;
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
@@ -36,6 +36,8 @@ typedef struct silt_fluid {
     double *share;        // owned, dim + 1 per cell, int of solid share times N_i over the volume; NULL without grains
     double *wall_force;   // owned, dim per node, N, explicit part of the law of the wall's traction; NULL without such walls
     double *shift;        // owned, dim per node, m/s: carries positions, not momentum, to where debts are paid; NULL without volume control
+    double *level_force;  // owned, dim per node, N, of the water behind openings with a level; NULL without such openings
+    double *level_brake;  // owned, per node, kg/s, part of friction: pressure that water loses as it comes in, over its speed
     double *belt;         // owned, dim per node, velocity of a wall's surface along itself; NULL without such walls
     double *mass;         // owned, per node, lumped mass of water, kg
     double *volume;       // owned, per node, lumped volume of the cells
@@ -99,6 +101,18 @@ void silt_hold_turn(const silt_fluid *fluid, int i, double *v);
 void silt_hold_project(const silt_fluid *fluid, int i, double *v);
 /** v with its held components replaced by the given ones */
 void silt_hold_impose(const silt_fluid *fluid, int i, double *v);
+
+// level.c -------------------------------------------------------------------------------------------------
+bool silt_levels_any(const silt_scene *scene);
+/** normals of the walls beside an opening among a node's walls. @return how many */
+int silt_level_sides(const silt_walls *walls, const silt_opening *opening, const int wall[3], const double *side[3]);
+/** unit direction in which a node on an opening crosses it, to the front, along the walls beside it */
+void silt_level_way(const silt_opening *opening, int n, const double *const side[3], double way[3]);
+/** how a node on an opening with a level is held: silt_walls_hold */
+silt_hold silt_level_hold(const silt_step *step, int i, double vector[3]);
+/** Pressure of the water behind openings, p = rho g (level - height), less rho u^2/2 where it comes in: level_force and
+ * level_brake, the latter added to friction. */
+void silt_levels_load(silt_fluid *fluid, const silt_step *step);
 
 // assemble.c ---------------------------------------------------------------------------------------------
 /** geometry, masses and stabilisation on the mesh half way along dt w; dt = 0: where the nodes are */

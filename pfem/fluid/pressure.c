@@ -81,7 +81,7 @@ void silt_pressure_free(silt_pressure **pressure) {
     *pressure = NULL;
 }
 
-// pieces of water without a free surface know their pressure up to a constant: one node each is pinned
+// pieces of water without a free surface, or an opening with a level, know their pressure up to a constant: one node each is pinned
 static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     SILT_RESERVE(p->pinned, p->pinned_capacity, mesh->n_node + 1);
     int *parent = silt_alloc((size_t)mesh->n_node + 1, sizeof *parent);
@@ -97,6 +97,9 @@ static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     for (int i = 0; i < mesh->n_node; i++)
         if (mesh->surface[i])
             p->pinned[silt_group_find(parent, i)] = 0;
+    for (int k = 0; k < mesh->n_facet; k++)
+        if (mesh->facet_kind[k] == FACET_OPEN)
+            p->pinned[silt_group_find(parent, mesh->facet[k][0])] = 0;
     free(parent);
 }
 
@@ -231,12 +234,16 @@ static void boundary_diagonal(silt_pressure *p, silt_fluid *f, const silt_mesh *
         for (int a = 0; a <= D; a++)
             for (int d = 0; d < D; d++)
                 normal[D * mesh->cell[e][a] + d] += f->flux[(D + 1) * D * e + D * a + d];
+    // openings with a level give their pressure as the surface does
+    for (int k = 0; k < mesh->n_facet; k++)
+        for (int a = 0; a < D && mesh->facet_kind[k] == FACET_OPEN; a++)
+            p->extra[mesh->facet[k][a]] = 1;
     for (int i = 0; i < p->n; i++) {
         silt_hold_project(f, i, normal + D * i);
         double square = 0;
         for (int d = 0; d < D; d++)
             square += silt_square(normal[D * i + d]);
-        p->extra[i] = mesh->surface[i] ? square / f->inertia[i] : 0;
+        p->extra[i] = mesh->surface[i] || p->extra[i] > 0 ? square / f->inertia[i] : 0;
     }
 }
 

@@ -225,6 +225,8 @@ static void seed_region(seed *s, int r, const double lo[2], const double hi[2]) 
 static void seed_inlets(seed *s) {
     for (int k = 0; k < s->scene->fluid.n_inlet && s->dim == 2; k++) {
         const silt_inlet *inlet = &s->scene->fluid.inlet[k];
+        if (inlet->drive == INLET_HEAD)
+            continue; // see seed_rims
         const double length = hypot(inlet->to[0] - inlet->from[0], inlet->to[1] - inlet->from[1]);
         double h = s->h;
         for (int m = 0; m <= 8 && s->size; m++) {

@@ -270,6 +270,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
             memcpy(nodes->x + D * i, run->x_old + D * i, (size_t)D * sizeof(double));
     const double fed = silt_mesh_volume(mesh, nodes->x);
     run->ledger.inflow_mass += rho * (fed - moved);
+    silt_run_levels(run);
     run->ledger.volume_solved += run->fluid.solved_volume;
     run->ledger.volume_given += run->fluid.given_back;
     run->ledger.volume_moved += moved - before - run->fluid.solved_volume - run->fluid.given_back;
@@ -277,6 +278,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
         silt_pockets_advance(&run->pockets, scene, mesh, run->x_old, nodes->x);
     silt_nodes_shuffle(nodes, mesh, scene, run->step);
     silt_memory_take(&run->memory, mesh, nodes);
+    silt_run_levels_thin(run);
 
     // from here on positions are mended: what that does to the volume is booked by the rebuild
     for (int i = 0; i < n; i++) {
