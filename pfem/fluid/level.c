@@ -41,6 +41,11 @@ silt_hold silt_level_hold(const silt_step *s, int i, double vector[3]) {
         if (!s->walls->slip[nodes->wall[i][k]])
             return HOLD_ALL;
     const int n = silt_level_sides(s->walls, &o, nodes->wall[i], side);
+    // on the rim a wall in the opening's own plane holds the water back
+    if (nodes->wall[i][n] >= 0 && n < 3) {
+        memcpy(vector, o.normal, 3 * sizeof *vector);
+        return s->mesh->surface[i] && n == 0 ? HOLD_NORMAL : HOLD_ALL;
+    }
     // the surface slides up and down the opening; below it water passes straight through
     if (s->mesh->surface[i] && n == 0)
         return HOLD_FREE;
