@@ -472,7 +472,8 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
     for (int s = 0; s < n_wall; s++)
         nodes->wall[i][s] = wall[s];
     silt_memory_extend(r->memory, nodes->count);
-    r->memory->interior[i] = closed;
+    // on a wall in space the edge's ends say it: nothing is free around it
+    r->memory->interior[i] = closed || (dim == 3 && (n_wall || open) && r->memory->interior[a] && r->memory->interior[b]);
     for (int k = 0; k < n_around; k++)
         for (int c = 0; c <= dim; c++) {
             const int j = r->mesh->cell[around[k]][c];
