@@ -245,39 +245,69 @@ static void seed_inlets(seed *s) {
     }
 }
 
-// true when there is water close before the opening at x
-static bool seed_wet(const seed *s, const silt_opening *o, const double *x) {
-    double before[3] = {0};
+// true when there is water before the opening at the share t of its edge from p to q
+static bool seed_wet(const seed *s, const silt_opening *o, const double *p, const double *q, double t) {
+    double x[3] = {0}, in[3] = {0};
+    const double off = 1e-7 * o->size;
     for (int d = 0; d < s->dim; d++)
-        before[d] = x[d] + 2e-3 * s->h * o->normal[d];
-    for (int k = 0; k < (s->dim == 3 ? 14 : 8); k++) {
-        double probe[3];
-        seed_probe(s, before, k, 0.37, probe);
-        for (int r = 0; r < s->scene->fluid.n_region; r++)
-            if (silt_region_contains(&s->scene->fluid.region[r], probe))
-                return true;
+        x[d] = p[d] + t * (q[d] - p[d]) + off * o->normal[d];
+    // off the edge into the opening: a rim may stand on a wall
+    for (int d = 0; d < 3 && s->dim == 3; d++) {
+        const int e = (d + 1) % 3, f = (d + 2) % 3;
+        in[d] = o->normal[e] * (q[f] - p[f]) - o->normal[f] * (q[e] - p[e]);
     }
+    const double length = silt_length(3, in);
+    for (int d = 0; d < 3 && length > 0; d++)
+        x[d] += off * in[d] / length;
+    for (int r = 0; r < s->scene->fluid.n_region; r++)
+        if (silt_region_contains(&s->scene->fluid.region[r], x))
+            return true;
     return false;
+}
+
+// nodes at spacing h on a part of an edge of an opening's rim
+static void seed_rim_part(seed *s, int opening, const double *p, const double *q, double from, double to) {
+    double length = 0;
+    for (int d = 0; d < s->dim; d++)
+        length = hypot(length, (to - from) * (q[d] - p[d]));
+    const int pieces = s->dim == 3 ? (int)silt_max(1, floor(length / s->h + 0.5)) : 1;
+    for (int m = 0; m <= pieces; m++) {
+        double x[3] = {0};
+        const double t = m == pieces ? to : from + (to - from) * m / pieces;
+        for (int d = 0; d < s->dim; d++)
+            x[d] = t == 1 ? q[d] : p[d] + (q[d] - p[d]) * t;
+        if (!seed_crowded(s, x, 1e-3 * s->h))
+            seed_opening(s, opening, x);
+    }
 }
 
 // The rims of openings with a level and of all openings in space, before the water's outline gives them their other nodes. Where
 // no water stands an opening with a level has none.
 static void seed_rims(seed *s) {
+    enum { SAMPLES = 256 };
     for (int k = 0; k < silt_opening_count(s->scene); k++) {
         const silt_opening o = silt_opening_of(s->scene, k);
         const int n = s->dim == 3 ? o.n_corner : 1;
         for (int c = 0; c < n && (o.level || (o.inlet && s->dim == 3)); c++) {
             const double *p = s->dim == 3 ? o.corner + 3 * c : o.from, *q = s->dim == 3 ? o.corner + 3 * ((c + 1) % n) : o.to;
-            double length = 0;
-            for (int d = 0; d < s->dim; d++)
-                length = hypot(length, q[d] - p[d]);
-            const int pieces = s->dim == 3 ? (int)silt_max(1, floor(length / s->h + 0.5)) : 1;
-            for (int m = 0; m <= pieces; m++) {
-                double x[3] = {0};
-                for (int d = 0; d < s->dim; d++)
-                    x[d] = m == pieces ? q[d] : p[d] + (q[d] - p[d]) * m / pieces;
-                if (!seed_crowded(s, x, 1e-6 * s->h) && (!o.level || seed_wet(s, &o, x)))
-                    seed_opening(s, k, x);
+            double from = 0;
+            bool before = false;
+            for (int m = 0; m <= SAMPLES; m++) {
+                // the ends themselves lie on walls, water may begin a hair inside of them
+                const double t = silt_clamp((double)m / SAMPLES, 1e-6, 1 - 1e-6);
+                const bool wet = !o.level || seed_wet(s, &o, p, q, t);
+                double low = (m - 1.0) / SAMPLES, high = t;
+                for (int half = 0; half < 60 && m && wet != before; half++) {
+                    const double middle = 0.5 * (low + high);
+                    *(seed_wet(s, &o, p, q, middle) == before ? &low : &high) = middle;
+                }
+                if (wet && !before)
+                    from = m ? high : 0;
+                else if (!wet && before)
+                    seed_rim_part(s, k, p, q, from, low);
+                if (wet && m == SAMPLES)
+                    seed_rim_part(s, k, p, q, from, 1);
+                before = wet;
             }
         }
     }

@@ -98,9 +98,48 @@ static void cut_triangle(piece_list *list, const silt_opening *o, const wall_pie
     piece_add(list, piece->corner[0], piece->corner[1], piece->corner[2], piece->source);
 }
 
+// true when v lies on the edge from a to b, at neither of its ends
+static bool on_edge(const double *a, const double *b, const double *v, double gap) {
+    double along = 0, square = 0, off = 0;
+    for (int d = 0; d < 3; d++) {
+        along += (v[d] - a[d]) * (b[d] - a[d]);
+        square += silt_square(b[d] - a[d]);
+    }
+    const double share = along / square, margin = gap / sqrt(square);
+    if (!(share > margin && share < 1 - margin))
+        return false;
+    for (int d = 0; d < 3; d++)
+        off += silt_square(v[d] - a[d] - share * (b[d] - a[d]));
+    return off < gap * gap;
+}
+
+// Where a corner of one triangle lies on another one's edge the other is split there: elements join corner by corner.
+static void split_edges(piece_list *list, const uint8_t *cut, double gap) {
+    piece_list corner = {0};
+    for (int i = 0; i < list->n; i++)
+        if (cut[list->piece[i].source])
+            piece_add(&corner, list->piece[i].corner[0], list->piece[i].corner[1], list->piece[i].corner[2], 0);
+    for (int i = 0; i < list->n; i++)
+        for (int m = 0; m < 3 * corner.n; m++) {
+            const double *v = corner.piece[m / 3].corner[m % 3];
+            const wall_piece p = list->piece[i];
+            for (int k = 0; k < 3; k++) {
+                const double *a = p.corner[k], *b = p.corner[(k + 1) % 3], *c = p.corner[(k + 2) % 3];
+                if (!on_edge(a, b, v, gap))
+                    continue;
+                piece_add(list, v, b, c, p.source);
+                memcpy(list->piece[i].corner[(k + 1) % 3], v, 3 * sizeof *v);
+                break;
+            }
+        }
+    free(corner.piece);
+}
+
 int wall_cut(const silt_walls *walls, const silt_scene *scene, wall_piece **piece) {
     piece_list list = {0};
     const int dim = wall_dim(walls);
+    uint8_t *cut = silt_alloc((size_t)walls->count + 1, 1);
+    double size = HUGE_VAL;
     for (int e = 0; e < walls->count; e++) {
         double room[3][3];
         const double *c[3] = {NULL};
@@ -121,14 +160,20 @@ int wall_cut(const silt_walls *walls, const silt_scene *scene, wall_piece **piec
                 in = fabs(silt_opening_height(&o, p->corner[c])) <= 1e-6 * o.size;
             if (!in)
                 piece_add(&next, p->corner[0], p->corner[1], dim == 3 ? p->corner[2] : NULL, e);
-            else if (dim == 3)
+            else if (dim == 3) {
+                const int n = next.n;
                 cut_triangle(&next, &o, p);
-            else
+                cut[e] |= next.n != n + 1 || memcmp(next.piece[n].corner, p->corner, sizeof p->corner) != 0;
+            } else
                 cut_segment(&next, &o, p);
         }
+        size = silt_min(size, o.size);
         free(list.piece);
         list = next;
     }
+    if (dim == 3)
+        split_edges(&list, cut, 1e-7 * size);
+    free(cut);
     *piece = list.piece;
     return list.n;
 }
