@@ -364,6 +364,18 @@ static void test_space(void **state) {
     assert_true(g[1].from[2] == 0.25 && g[2].from[2] == 0 && g[4].from[0] == 1);
     silt_scene_free(&s);
     // a field in space
+    s = right(RIGHT "space.yaml", 0, NULL);
+    // openings: outlets count on after the inlets, normals into the water
+    assert_true(silt_opening_count(s) == 4 && s->fluid.inlet[0].n_corner == 3 && s->fluid.outlet[1].corner[11] == 1);
+    const silt_opening pipe = silt_opening_of(s, 0), sea = silt_opening_of(s, 3);
+    assert_true(pipe.inlet && !pipe.level && pipe.normal[0] == 1 && !sea.inlet && sea.normal[0] == -1 && sea.n_corner == 4);
+    assert_true(silt_series_at(silt_opening_of(s, 1).level, 1, 5) == 1.25 && silt_series_at(sea.level, 1, 7) == 1.5);
+    assert_true(fabs(silt_opening_height(&sea, (double[]){2.9, 0.5, 1.5}) - 0.1) < 1e-15);
+    assert_true(fabs(silt_opening_depth(&sea, (double[]){2.9, 0.2, 1.5}) - 0.2) < 1e-15);
+    assert_true(silt_opening_depth(&pipe, (double[]){0, 0.1, 0.2}) < 0 && silt_opening_depth(&pipe, (double[]){0, 0.5, 0.2}) > 0);
+    assert_true(silt_opening_on(s, (double[]){3, 0.5, 1.5}, 1e-9, false) == 3 && silt_opening_on(s, (double[]){0, 0.5, 0.1}, 1e-9, true) == 0);
+    assert_true(silt_opening_on(s, (double[]){0, 0.5, 0.1}, 1e-9, false) == -1);
+    silt_scene_free(&s);
     s = right(RIGHT "space.yaml", 1, (const char *[]){"fluid.velocity={formula: field, file: points3.csv}"});
     silt_formula_velocity(&s->fluid.velocity, 9.81, (double[]){0.1, 0.2, 0.3}, v);
     assert_true(fabs(v[0] - 0.1) + fabs(v[1] - 0.2) + fabs(v[2] - 0.3) < 1e-14);
