@@ -85,6 +85,7 @@ typedef struct refinement {
     const silt_walls *walls;
     int dim;
     double h; // fluid.size
+    bool fed; // in space: water comes in or leaves through openings that have nodes
     uint8_t *locked, *long_edge; // one per node: has an edge that may be too long
     int *facet_start, *facet; // boundary facets of every node
     candidate *list;
@@ -472,8 +473,9 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
     for (int s = 0; s < n_wall; s++)
         nodes->wall[i][s] = wall[s];
     silt_memory_extend(r->memory, nodes->count);
-    // on a wall in space the edge's ends say it: nothing is free around it
-    r->memory->interior[i] = closed || (dim == 3 && (n_wall || open) && r->memory->interior[a] && r->memory->interior[b]);
+    // on a wall in space the edge's ends say it: nothing is free around it. Where openings stretch the cells on walls these would
+    // go otherwise, and leave dents
+    r->memory->interior[i] = closed || (r->fed && (n_wall || open) && r->memory->interior[a] && r->memory->interior[b]);
     for (int k = 0; k < n_around; k++)
         for (int c = 0; c <= dim; c++) {
             const int j = r->mesh->cell[around[k]][c];
@@ -599,8 +601,10 @@ void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *mem
     refinement r = {.mesh = mesh, .nodes = nodes, .memory = memory, .walls = mesh->walls, .dim = silt_nodes_dim(nodes), .h = h};
     r.locked = silt_alloc((size_t)mesh->n_node + 1, 1);
     r.long_edge = silt_alloc((size_t)mesh->n_node + 1, 1);
-    for (int i = 0; i < mesh->n_node; i++)
+    for (int i = 0; i < mesh->n_node; i++) {
         r.locked[i] = memory->dead[i];
+        r.fed |= r.dim == 3 && (nodes->kind[i] == NODE_INLET || nodes->kind[i] == NODE_OPEN);
+    }
     refine_facets(&r);
     refine_crowded(&r);
     refine_flat(&r);

@@ -390,6 +390,9 @@ double silt_formula_surface(const silt_formula *formula, const double *x);
 int silt_formula_prepare(silt_formula *formula);
 void silt_formula_clear(silt_formula *formula); /**< frees series and field */
 
+/** true for the name of a shape that gmsh has to triangulate: .geo, .step, .brep, .iges */
+bool silt_surface_is_shape(const char *path);
+
 /** An inlet or outlet as a place: the outlets count on after the inlets. All borrowed from the scene. */
 typedef struct silt_opening {
     int dim, n_corner;

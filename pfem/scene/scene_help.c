@@ -215,7 +215,7 @@ char *silt_key_allowed(const silt_key *key, int dimension) {
     } else if (key->kind == KEY_NAME) {
         fprintf(to, "a name of letters, digits and underscores that begins with a letter");
     } else if (key->kind == KEY_SURFACE) {
-        fprintf(to, "an STL or .msh file beside the scene");
+        fprintf(to, "an STL or .msh file beside the scene, or a shape for gmsh");
     } else if (key->kind == KEY_FILE || key->kind == KEY_SERIES || key->kind == KEY_TABLE) {
         fprintf(to, "a CSV file beside the scene");
     } else {

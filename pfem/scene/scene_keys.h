@@ -169,5 +169,6 @@ void silt_scene_settle(silt_reader *reader, silt_scene *scene);
 void silt_scene_check(silt_reader *reader, silt_scene *scene);
 /** the resolved scene as YAML; owned by the caller. names: files with their folder (true), or their last part only */
 char *silt_scene_text(const silt_scene *scene, bool folders);
+uint64_t silt_scene_hash(const silt_scene *scene); // scene_hash.c
 
 #endif

@@ -717,50 +717,6 @@ void silt_scene_free(silt_scene **scene) {
     *scene = NULL;
 }
 
-// numbers of the tables and bytes of the files that the water's start and its walls are made from
-static uint64_t read_hash_series(uint64_t hash, const silt_series *series) {
-    return silt_hash(hash, series->value, (size_t)series->n_row * (size_t)series->n_column * sizeof *series->value);
-}
-
-static uint64_t read_hash_file(uint64_t hash, const char *path) {
-    char block[1 << 14];
-    FILE *file = path ? fopen(path, "rb") : NULL;
-    for (size_t n; file && (n = fread(block, 1, sizeof block, file)) > 0;)
-        hash = silt_hash(hash, block, n);
-    if (file)
-        fclose(file);
-    return hash;
-}
-
-static uint64_t read_hash_outline(uint64_t hash, const silt_region *region) {
-    return region->outline ? silt_hash(hash, region->point, (size_t)region->n_point * 3 * sizeof(double)) : hash;
-}
-
-// hash of the resolved text without folders, and of what the files hold
-static uint64_t read_hash(const silt_scene *scene) {
-    const silt_fluid_def *fluid = &scene->fluid;
-    char *text = silt_scene_text(scene, false);
-    uint64_t hash = silt_hash(0, text, strlen(text));
-    free(text);
-    for (int i = 0; i < fluid->n_inlet; i++)
-        hash = read_hash_series(read_hash_series(hash, &fluid->inlet[i].series), &fluid->inlet[i].head);
-    for (int i = 0; i < fluid->n_outlet; i++)
-        hash = read_hash_series(hash, &fluid->outlet[i].level);
-    for (int i = 0; i < scene->n_wall; i++) {
-        hash = read_hash_series(hash, &scene->wall[i].motion);
-        hash = read_hash_file(hash, scene->wall[i].surface);
-    }
-    for (int i = 0; i < fluid->n_region; i++)
-        hash = read_hash_outline(hash, &fluid->region[i]);
-    for (int i = 0; i < scene->bed.n_region; i++)
-        hash = read_hash_outline(hash, &scene->bed.region[i]);
-    for (int i = 0; i < fluid->n_size; i++)
-        hash = read_hash_outline(hash, &fluid->size_at[i].region);
-    hash = read_hash_series(hash, &fluid->velocity.series);
-    hash = read_hash_series(hash, &fluid->force.series);
-    return read_hash_file(hash, fluid->cloud);
-}
-
 silt_status silt_scene_read(const char *path, int n_set, const char *const *set, silt_scene **scene, silt_error *err) {
     silt_reader reader = {0};
     read_state state = {.reader = &reader};
@@ -783,7 +739,7 @@ silt_status silt_scene_read(const char *path, int n_set, const char *const *set,
     silt_status status = silt_complaints_report(&reader, err);
     if (status == SILT_OK) {
         made->resolved = silt_scene_text(made, true);
-        made->hash = read_hash(made);
+        made->hash = silt_scene_hash(made);
         // the resolved scene must be readable again
         if (strlen(made->resolved) > SCENE_BYTES)
             status = silt_fail(err, SILT_INPUT,

@@ -112,6 +112,13 @@ typedef struct silt_surface {
  * Errors (SILT_INPUT, with file and line or triangle): unreadable, no triangles, two neighbours that are turned differently. */
 silt_status silt_surface_read(const char *path, double scale, bool inside_out, silt_surface *surface, silt_error *err);
 void silt_surface_clear(silt_surface *surface);
+
+// gmsh.c ----------------------------------------------------------------------------------------------
+/** true when the module that reads with gmsh is there */
+bool wall_gmsh_there(void);
+/** Reads what only gmsh can: shapes (.geo, .step, .brep, .iges), which it triangulates, and meshes in other forms.
+ * Errors (SILT_INPUT): no such module, or what gmsh says. */
+silt_status wall_gmsh_read(const char *path, silt_surface *surface, silt_error *err);
 /** Numbers points so that those closer than gap share one (gap 0: equal ones). @return how many numbers */
 int wall_weld(int n, const double (*point)[3], double gap, int *number);
 
