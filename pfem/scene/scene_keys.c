@@ -318,7 +318,7 @@ static const silt_key wall_rows[] = {
      .doc = "closed box around the water, lower left corner first"},
     {"surface", KEY_SURFACE, .flags = KEY_CHOICE | KEY_SPACE, .select = WALL_SURFACE, AT(silt_wall, surface),
      .doc = "triangulated surface, normals into the water: STL or .msh; with libgmsh at the build also .msh of other versions, and "
-            ".geo, .step, .brep, .iges, triangulated, volumes with their normals out of them"},
+            ".geo, .step, .brep, .iges, which it triangulates, normals out of closed shapes"},
     {"closed", KEY_SWITCH, .fallback = "false", .flags = KEY_PLANE, .when = ONLY(WALL_POLYLINE) | ONLY(WALL_BOX),
      AT(silt_wall, closed), .doc = "the last point is joined to the first"},
     {"scale", KEY_NUMBER, .fallback = "1", .flags = KEY_OPEN_LOW | KEY_SPACE, .low = 0, .high = HUGE_VAL,

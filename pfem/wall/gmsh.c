@@ -27,6 +27,78 @@ static void *module_open(char why[512]) {
     return NULL;
 }
 
+// ---- gmsh turns the triangles of each face as the face lies in its shape: they are turned alike here
+
+typedef struct side {
+    int low, high, triangle;
+    bool backwards; // runs from the higher to the lower point
+} side;
+
+static int compare_sides(const void *a, const void *b) {
+    const side *p = a, *q = b;
+    return p->low != q->low ? (p->low > q->low) - (p->low < q->low) : (p->high > q->high) - (p->high < q->high);
+}
+
+static double volume_under(const silt_surface *s, int t) {
+    const double *a = s->point[s->triangle[t][0]], *b = s->point[s->triangle[t][1]], *c = s->point[s->triangle[t][2]];
+    double n[3];
+    wall_cross(b, c, n);
+    return wall_dot(a, n) / 6;
+}
+
+// Neighbours alike, over edges that two triangles share; pieces that enclose a volume turned out of it.
+static void turn_alike(silt_surface *s) {
+    const int n = 3 * s->n_triangle;
+    side *edge = silt_alloc((size_t)n + 1, sizeof *edge);
+    int *across = silt_alloc((size_t)n + 1, sizeof *across), *stack = silt_alloc((size_t)s->n_triangle + 1, sizeof *stack);
+    uint8_t *state = silt_alloc((size_t)s->n_triangle + 1, 1); // 0: not met, 1: stays, 2: turned
+    for (int k = 0; k < n; k++) {
+        const int a = s->triangle[k / 3][k % 3], b = s->triangle[k / 3][(k + 1) % 3];
+        edge[k] = (side){a < b ? a : b, a < b ? b : a, k, b < a};
+        across[k] = -1;
+    }
+    qsort(edge, (size_t)n, sizeof *edge, compare_sides);
+    for (int k = 0, end; k < n; k = end) {
+        for (end = k + 1; end < n && compare_sides(&edge[k], &edge[end]) == 0;)
+            end++;
+        if (end != k + 2)
+            continue;
+        // the neighbour, and whether both run the same way: then one of them must turn
+        const int same = edge[k].backwards == edge[k + 1].backwards;
+        across[edge[k].triangle] = 2 * (edge[k + 1].triangle / 3) + same;
+        across[edge[k + 1].triangle] = 2 * (edge[k].triangle / 3) + same;
+    }
+    for (int first = 0; first < s->n_triangle; first++) {
+        if (state[first])
+            continue;
+        int n_stack = 0, met = 0;
+        double volume = 0;
+        state[stack[n_stack++] = first] = 1;
+        while (met < n_stack) {
+            const int t = stack[met++];
+            volume += (state[t] == 1 ? 1 : -1) * volume_under(s, t);
+            for (int k = 3 * t; k < 3 * t + 3; k++) {
+                const int other = across[k] / 2;
+                if (across[k] < 0 || state[other])
+                    continue;
+                state[other] = across[k] % 2 ? 3 - state[t] : state[t];
+                stack[n_stack++] = other;
+            }
+        }
+        for (int m = 0; m < n_stack; m++) {
+            const int t = stack[m], swap = s->triangle[t][1];
+            if ((state[t] == 2) == (volume < 0))
+                continue;
+            s->triangle[t][1] = s->triangle[t][2];
+            s->triangle[t][2] = swap;
+        }
+    }
+    free(edge);
+    free(across);
+    free(stack);
+    free(state);
+}
+
 bool wall_gmsh_there(void) {
     char why[512];
     return module_open(why) != NULL; // opened once more it is the same
@@ -57,6 +129,8 @@ silt_status wall_gmsh_read(const char *path, silt_surface *surface, silt_error *
         surface->source = silt_alloc(found.n_triangle + 1, sizeof *surface->source);
         for (int t = 0; t < surface->n_triangle; t++)
             surface->source[t] = t + 1;
+        if (silt_surface_is_shape(path))
+            turn_alike(surface);
     }
     free(found.point);
     free(found.triangle);

@@ -30,11 +30,10 @@ static void start(int *error) {
     gmshOptionSetNumber("Mesh.MeshSizeFromCurvature", 24, &ignored); // triangles a turn
 }
 
-// a shape without triangles gets them; the surfaces of volumes are turned out of them
+// a shape without triangles gets them
 static void mesh_surfaces(int *error) {
-    size_t *tag = NULL, n_tag = 0, n_coord = 0, n_parameter = 0, n_pair = 0;
+    size_t *tag = NULL, n_tag = 0, n_coord = 0, n_parameter = 0;
     double *coord = NULL, *parameter = NULL;
-    int *pair = NULL, ignored;
     gmshModelMeshGetNodes(&tag, &n_tag, &coord, &n_coord, &parameter, &n_parameter, 2, -1, 1, 0, error);
     gmshFree(tag);
     gmshFree(coord);
@@ -42,10 +41,6 @@ static void mesh_surfaces(int *error) {
     if (*error || n_tag)
         return;
     gmshModelMeshGenerate(2, error);
-    gmshModelGetEntities(&pair, &n_pair, 3, &ignored);
-    for (size_t k = 0; k + 1 < n_pair && !*error; k += 2)
-        gmshModelMeshSetOutwardOrientation(pair[k + 1], error);
-    gmshFree(pair);
 }
 
 static void nodes_take(silt_gmsh_surface *s, size_t **number, size_t *n_number, int *error) {
