@@ -67,13 +67,14 @@ static double corner_area(const double *a, const double *b, const double *c) {
 
 // what is left of a triangle: beyond each side of the opening in turn
 static void cut_triangle(piece_list *list, const silt_opening *o, const wall_piece *piece) {
-    enum { MOST = 64 };
-    double rest[MOST][3], beyond[MOST][3], kept[MOST][3];
+    // a cut adds a corner at most
+    const size_t room = (size_t)o->n_corner + 8;
+    double(*rest)[3] = silt_alloc(3 * room, sizeof *rest), (*beyond)[3] = rest + room, (*kept)[3] = beyond + room;
     int n = 3;
     const double gap = 1e-9 * o->size;
     const int first = list->n;
     memcpy(rest, piece->corner, sizeof piece->corner);
-    for (int c = 0; c < o->n_corner && n >= 3 && n < MOST - 2; c++) {
+    for (int c = 0; c < o->n_corner && n >= 3; c++) {
         const double *p = o->corner + 3 * c, *q = o->corner + 3 * ((c + 1) % o->n_corner);
         const double edge[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
         double in[3];
@@ -86,11 +87,12 @@ static void cut_triangle(piece_list *list, const silt_opening *o, const wall_pie
             if (corner_area(beyond[0], beyond[k], beyond[k + 1]) > gap * o->size)
                 piece_add(list, beyond[0], beyond[k], beyond[k + 1], piece->source);
         n = clip(n, (const double(*)[3])rest, p, in, 1, gap, kept);
-        memcpy(rest, kept, sizeof rest);
+        memcpy(rest, kept, (size_t)n * sizeof *rest);
     }
     double left = 0;
     for (int k = 1; k + 1 < n; k++)
         left += corner_area(rest[0], rest[k], rest[k + 1]);
+    free(rest);
     if (left > gap * o->size)
         return;
     // nothing of it lies in the opening: whole as it was
