@@ -74,6 +74,35 @@ double silt_seconds(void) {
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
+static _Thread_local struct {
+    double seconds[CLOCK_COUNT], since;
+    silt_clock now;
+} clocks = {.now = CLOCK_rest};
+
+silt_clock silt_clock_to(silt_clock clock) {
+    const double now = silt_seconds();
+    const silt_clock before = clocks.now;
+    clocks.seconds[before] += now - clocks.since;
+    clocks.since = now;
+    clocks.now = clock;
+    return before;
+}
+
+void silt_clock_reset(void) {
+    silt_clock_to(CLOCK_rest);
+    memset(clocks.seconds, 0, sizeof clocks.seconds);
+}
+
+void silt_clock_book(silt_clock clock, double seconds) {
+    clocks.seconds[clock] += seconds;
+    clocks.seconds[clocks.now] -= seconds;
+}
+
+void silt_clock_read(double seconds[CLOCK_COUNT]) {
+    silt_clock_to(clocks.now);
+    memcpy(seconds, clocks.seconds, sizeof clocks.seconds);
+}
+
 uint64_t silt_hash(uint64_t seed, const void *data, size_t size) {
     // FNV-1a, 64 bits
     uint64_t hash = seed ? seed : 0xcbf29ce484222325u;

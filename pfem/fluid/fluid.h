@@ -74,7 +74,6 @@ typedef struct silt_fluid {
     double given_back;        // m3, volume that the debts asked for
     double momentum_residual; // N, unbalanced force on free nodes
     double momentum_scale;    // N, what it is relative to
-    double seconds_assemble, seconds_solve;
 } silt_fluid;
 
 void silt_fluid_clear(silt_fluid *fluid);
