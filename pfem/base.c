@@ -77,10 +77,24 @@ double silt_seconds(void) {
 static _Thread_local struct {
     double seconds[CLOCK_COUNT], since;
     silt_clock now;
+    bool cpu;
 } clocks = {.now = CLOCK_rest};
 
+double silt_clock_now(void) {
+    if (!clocks.cpu)
+        return silt_seconds();
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+void silt_clock_cpu(bool cpu) {
+    clocks.cpu = cpu;
+    silt_clock_reset();
+}
+
 silt_clock silt_clock_to(silt_clock clock) {
-    const double now = silt_seconds();
+    const double now = silt_clock_now();
     const silt_clock before = clocks.now;
     clocks.seconds[before] += now - clocks.since;
     clocks.since = now;
@@ -89,7 +103,8 @@ silt_clock silt_clock_to(silt_clock clock) {
 }
 
 void silt_clock_reset(void) {
-    silt_clock_to(CLOCK_rest);
+    clocks.now = CLOCK_rest;
+    clocks.since = silt_clock_now();
     memset(clocks.seconds, 0, sizeof clocks.seconds);
 }
 

@@ -44,6 +44,8 @@ typedef enum silt_clock {
 #undef X
         CLOCK_COUNT
 } silt_clock;
+void silt_clock_cpu(bool cpu);                /**< this thread's clocks tick on the wall, or in the process' own CPU time */
+double silt_clock_now(void);                  /**< s, of that */
 void silt_clock_reset(void);                  /**< all at 0, `rest` runs */
 silt_clock silt_clock_to(silt_clock clock);   /**< from now on this one runs; @return the one that ran */
 void silt_clock_book(silt_clock clock, double seconds); /**< s of the clock that runs are this one's */

@@ -2,6 +2,7 @@
 // the same operator, applied cell by cell, preconditioned by the factor of a compact Laplacian that resembles it
 #include <cholmod.h>
 #include <dlfcn.h>
+#include <omp.h>
 
 #include "fluid.h"
 
@@ -240,6 +241,14 @@ static void boundary_diagonal(silt_pressure *p, silt_fluid *f, const silt_mesh *
     }
 }
 
+int silt_factorize(void *matrix, void *factor, void *common) {
+    const int levels = omp_get_max_active_levels();
+    omp_set_max_active_levels(0);
+    const int done = cholmod_factorize(matrix, factor, common);
+    omp_set_max_active_levels(levels);
+    return done;
+}
+
 static silt_status system_factor(silt_pressure *p, silt_system *system, const silt_fluid *f, const silt_step *s, bool fresh, silt_error *err) {
     if (fresh) {
         cholmod_free_factor(&system->factor, &p->common);
@@ -248,7 +257,7 @@ static silt_status system_factor(silt_pressure *p, silt_system *system, const si
     cholmod_factor *factor = system->factor;
     int done = 0;
     if (factor)
-        SILT_CLOCKED(factor, done = cholmod_factorize(system->matrix, factor, &p->common));
+        SILT_CLOCKED(factor, done = silt_factorize(system->matrix, factor, &p->common));
     if (!done || p->common.status == CHOLMOD_NOT_POSDEF) {
         const int bad = factor ? (int)factor->minor : 0;
         const int node = factor && factor->Perm && bad < p->n ? ((int *)factor->Perm)[bad] : 0;

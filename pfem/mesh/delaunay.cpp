@@ -5,8 +5,8 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
 #include <CGAL/Triangulation_vertex_base_with_info_3.h>
-#include <chrono>
 #include <cstdlib>
+#include <ctime>
 #include <new>
 #include <utility>
 #include <vector>
@@ -22,9 +22,9 @@ using Structure3 = CGAL::Triangulation_data_structure_3<Vertex3, Cell3>;
 using Delaunay3 = CGAL::Delaunay_triangulation_3<Kernel, Structure3>;
 
 template <class Mesh, class Cloud> double seconds_of(const Cloud &cloud) {
-    const auto since = std::chrono::steady_clock::now();
+    const std::clock_t since = std::clock();
     Mesh mesh(cloud.begin(), cloud.end());
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count();
+    return static_cast<double>(std::clock() - since) / CLOCKS_PER_SEC;
 }
 
 std::vector<std::pair<Kernel::Point_2, int>> cloud_2d(int n, const double *x) {

@@ -162,14 +162,14 @@ static silt_status measure_run(silt_run *run, double started, bench_row *row, si
     int n_unit = 0, capacity = 0, n = 0;
     silt_status status = SILT_OK;
     while (status == SILT_OK) {
-        const double now = silt_seconds();
+        const double now = silt_clock_now();
         if (now - last > UNIT_2_EVERY || run->time >= n_unit * end / (UNIT_2_TIMES - 1) * (1 - 1e-9)) {
             row->bytes = silt_max(row->bytes, memory_line("VmHWM"));
             SILT_RESERVE(unit, capacity, n_unit + 1);
             unit[n_unit++] = unit_2();
             sum.unit += silt_delaunay_seconds(row->dimension, run->nodes.count, run->nodes.x) / run->nodes.count;
             memory_forget();
-            last = silt_seconds();
+            last = silt_clock_now();
             apart += last - now;
         }
         if (run->time >= end * (1 - 1e-12))
@@ -184,7 +184,7 @@ static silt_status measure_run(silt_run *run, double started, bench_row *row, si
             ((double *)&sum)[k] += ((double *)&s)[k];
         n++;
     }
-    row->seconds = silt_seconds() - started - apart;
+    row->seconds = silt_clock_now() - started - apart;
     row->time = run->time;
     row->steps = n;
     const double steps = silt_max(n, 1);
@@ -228,10 +228,13 @@ static silt_status row_measure(const silt_bench_def *def, const char *folder, be
     silt_status status = kind ? bench_scene_make(&scene, kind, row->size, folder, def->n_set, def->set, err)
                               : silt_scene_read(row->name, def->n_set, def->set, &scene, err);
     if (status == SILT_OK) {
-        const double before = memory_line("VmRSS"), started = silt_seconds();
+        // on one thread what counts is the processor's time: a busy machine adds none to it
+        row->cpu = row->threads == 1 && !silt_scene_has_dem(scene);
+        silt_clock_cpu(row->cpu);
+        const double before = memory_line("VmRSS"), started = silt_clock_now();
         row->dimension = scene->dimension;
         status = silt_run_open(&run, scene, &run_def, folder, -1, err);
-        row->start = silt_seconds() - started;
+        row->start = silt_clock_now() - started;
         if (status == SILT_OK && !scene->fluid.on)
             status = silt_fail(err, SILT_INPUT, "%s: bench needs a scene with water", row->name);
         if (status == SILT_OK)

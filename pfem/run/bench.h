@@ -44,6 +44,7 @@ typedef struct bench_row {
     double size;                  // asked for
     int dimension, threads, steps, warm_up;
     bool whole;                   // a run to its end: sums over it, else medians over steps
+    bool cpu;                     // times are the processor's, else the wall's
     double nodes, cells, grains;  // means over the steps
     double phase[CLOCK_COUNT];    // s per node and step
     double step, mean;            // s per node and step: sum of the phases, and the mean over the steps

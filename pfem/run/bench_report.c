@@ -35,6 +35,7 @@ static void growth_print(FILE *to, const bench_row *row, int n, double first, do
 void bench_table(FILE *to, const bench_row *row, int n) {
     const bench_scene *kind = bench_scene_find(row->name);
     fprintf(to, "%s: %s; %d thread%s", row->name, kind ? kind->document : "a scene's file", row->threads, row->threads > 1 ? "s" : "");
+    fprintf(to, ", %s time", row->cpu ? "CPU" : "wall");
     if (!row->whole)
         fprintf(to, ", medians of %d steps after %d", row->steps, row->warm_up);
     fputc('\n', to);
@@ -91,7 +92,7 @@ void bench_table(FILE *to, const bench_row *row, int n) {
 static void row_json(FILE *to, const bench_row *r, const bench_row *before) {
     fputs("    {\"scene\": ", to);
     silt_json_text(to, r->name);
-    fprintf(to, ", \"dimension\": %d, \"threads\": %d, \"steps\": %d, \"warm_up\": %d,\n     ", r->dimension, r->threads, r->steps, r->warm_up);
+    fprintf(to, ", \"clock\": \"%s\", \"dimension\": %d, \"threads\": %d, \"steps\": %d, \"warm_up\": %d,\n     ", r->cpu ? "cpu" : "wall", r->dimension, r->threads, r->steps, r->warm_up);
     const struct {
         const char *name;
         double value;

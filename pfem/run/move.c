@@ -290,12 +290,12 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     }
     carry_slip(run);
     place_bodies(run);
-    SILT_CLOCKED(bed, silt_run_bed_sync(run));
+    silt_run_bed_sync(run);
     silt_memory_extend(&run->memory, nodes->count);
     SILT_RESERVE(run->x_old, run->x_old_capacity, D * (nodes->count + 1));
     for (int k = D * n; k < D * nodes->count; k++)
         run->x_old[k] = nodes->x[k];
-    SILT_CLOCKED(bed, remember_bed(run));
+    remember_bed(run);
     SILT_RESERVE(run->wall_before, run->wall_before_capacity, nodes->count + 1);
     SILT_RESERVE(run->v_before, run->v_before_capacity, D * (nodes->count + 1));
     for (int i = 0; i < nodes->count; i++)
