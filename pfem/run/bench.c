@@ -113,12 +113,11 @@ static double mean(int n, const sample *s, size_t offset) {
 #define MEAN(n, s, field) mean(n, s, offsetof(sample, field))
 
 // the steps one by one: medians, since what disturbs one step lasts for a few only
-static silt_status measure_steps(silt_run *run, const silt_bench_def *def, bench_row *row, silt_error *err) {
+static silt_status measure_steps(silt_run *run, bench_row *row, silt_error *err) {
     const int n = row->steps;
     sample *s = silt_alloc((size_t)n + 1, sizeof *s);
     double *ratio = silt_alloc((size_t)n + 1, sizeof *ratio);
     silt_status status = SILT_OK;
-    (void)def;
     for (int k = 0; k < row->warm_up && status == SILT_OK; k++)
         status = step_measure(run, s, err);
     for (int k = 0; k < n && status == SILT_OK; k++) {
@@ -238,7 +237,7 @@ static silt_status row_measure(const silt_bench_def *def, const char *folder, be
         if (status == SILT_OK && !scene->fluid.on)
             status = silt_fail(err, SILT_INPUT, "%s: bench needs a scene with water", row->name);
         if (status == SILT_OK)
-            status = row->whole ? measure_run(&run, started, row, err) : measure_steps(&run, def, row, err);
+            status = row->whole ? measure_run(&run, started, row, err) : measure_steps(&run, row, err);
         row->bytes = (row->bytes - before) / row->nodes;
         silt_run_free(&run);
     }
