@@ -384,10 +384,8 @@ silt_status silt_bench(const silt_bench_def *def, FILE *to, silt_error *err) {
     for (const char *list = scenes; list && status == SILT_OK;) {
         list = list_next(list, name);
         status = scene_measure(def, name, to, &row, &n, &capacity, err);
-    }
-    // what was measured before something failed is told too
-    if (def->json && n) {
-        const silt_status written = bench_json(def->json, row, n, status == SILT_OK ? err : NULL);
+        // after each scene: what was measured before something failed is told too
+        const silt_status written = def->json && n ? bench_json(def->json, row, n, status == SILT_OK ? err : NULL) : SILT_OK;
         status = status == SILT_OK ? written : status;
     }
     free(row);
