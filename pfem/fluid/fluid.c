@@ -287,11 +287,10 @@ static silt_status project_start(silt_fluid *f, const silt_step *s, const double
             silt_hold_turn(f, i, v + D * i);
     silt_assemble_projection(f, s->mesh, p);
     const double before = kinetic_energy(f, s, v);
-    for (int pass = 0; pass < 2; pass++) {
-        silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
-        SILT_TRY(pressure_increment(f, s, 1e-2, err));
-        correct(f, s, f->increment, v);
-    }
+    // once: what is left is the smoothing's, and more of it makes the pressure rougher
+    silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
+    SILT_TRY(pressure_increment(f, s, 1e-2, err));
+    correct(f, s, f->increment, v);
     f->projected = before - kinetic_energy(f, s, v);
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i])
@@ -307,7 +306,7 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
     for (int i = 0; i < f->n_node && !any; i++)
         any = f->rate[i] != 0;
     memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);
-    for (int pass = 0; pass < 4 && any; pass++) {
+    for (int pass = 0; pass < 2 && any; pass++) {
         memset(f->increment, 0, (size_t)f->n_node * sizeof *f->increment);
         silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
         for (int i = 0; i < f->n_node; i++)

@@ -13,8 +13,6 @@ typedef struct silt_pressure silt_pressure; // the pressure matrix and its facto
 typedef struct silt_stiff silt_stiff;       // factors of momentum and continuity where viscosity is stiff, stiff.c
 typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
 
-/** cholmod_factorize on one thread: CHOLMOD 3 asks OpenMP for four, however many there are, to fill in small maps */
-int silt_factorize(void *matrix, void *factor, void *common);
 
 /** what a step sees */
 typedef struct silt_step {
