@@ -57,7 +57,8 @@ void silt_debts_ask(silt_fluid *f, const silt_step *s) {
             debt[i] += change[i];
     }
     for (int i = 0; i < f->n_node; i++)
-        if (mesh->wet[i])
+        // with the Laplacian the surface's nodes cannot be asked
+        if (mesh->wet[i] && !(mesh->surface[i] && s->scene->fluid.pressure == PRESSURE_LAPLACIAN))
             f->rate[i] = silt_clamp(debt[i], -DEBT_CAP * f->volume[i], DEBT_CAP * f->volume[i]) / time;
     keep_closed(f, mesh);
 }
