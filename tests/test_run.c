@@ -31,7 +31,7 @@ static void begin(silt_run *run, silt_scene **scene, const char *path, int n_set
 }
 
 static void end(silt_run *run, silt_scene **scene) {
-    run_free(run);
+    silt_run_free(run);
     silt_scene_free(scene);
     DIR *list = opendir(folder);
     for (struct dirent *entry; list && (entry = readdir(list));)
