@@ -400,15 +400,17 @@ static silt_status correct_stiff(silt_fluid *f, silt_error *err) {
     return status;
 }
 
-// a node that came within the courant number and leaves by more than a cell: the step was too long for what happened in it
+// A node that came within the courant number and leaves by more than a cell: the step was too long for what happened in it. Where
+// no smaller step will follow, over ten cells: no result after that is worth having.
 static silt_status astray_node(const silt_fluid *f, const silt_step *s, silt_error *err) {
     const int D = f->dim;
-    for (int i = 0; i < f->n_node && !f->last_try; i++) {
-        const double h = silt_node_h(s->nodes, i, s->scene->fluid.size);
-        if (!s->mesh->wet[i] || silt_length(D, f->w + D * i) * s->dt < 1.5 * h || silt_length(D, s->nodes->v + D * i) * s->dt > h)
+    const double most = f->last_try ? 10 : 1.5;
+    for (int i = 0; i < f->n_node; i++) {
+        const double h = silt_node_h(s->nodes, i, s->scene->fluid.size), way = silt_length(D, f->w + D * i) * s->dt;
+        if (!s->mesh->wet[i] || way < most * h || (!f->last_try && silt_length(D, s->nodes->v + D * i) * s->dt > h))
             continue;
-        return silt_fail(err, SILT_FAILED, "a node at (%g, %g) would be thrown over %.1f cells in a step", s->nodes->x[D * i],
-                         s->nodes->x[D * i + 1], silt_length(D, f->w + D * i) * s->dt / h);
+        return silt_fail(err, SILT_FAILED, "a node at (%g, %g) would be thrown over %.3g cells in a step", s->nodes->x[D * i],
+                         s->nodes->x[D * i + 1], way / h);
     }
     return SILT_OK;
 }
