@@ -248,6 +248,15 @@ static void remember_bed(silt_run *run) {
             run->bed.fluid_node[k] = -1; // water now
 }
 
+// In a central force field it is the pressure with the potential that is smooth: that is what nodes that come get the mean of.
+static void potential_add(silt_run *run, double sign) {
+    const silt_fluid_def *fluid = &run->scene->fluid;
+    silt_nodes *nodes = &run->nodes;
+    if (fluid->force.kind == FORMULA_CENTRAL)
+        for (int i = 0; i < nodes->count; i++)
+            nodes->p[i] += sign * fluid->density * silt_formula_potential(&fluid->force, nodes->x + silt_nodes_dim(nodes) * i);
+}
+
 silt_status silt_run_move(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     silt_nodes *nodes = &run->nodes;
@@ -276,6 +285,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     run->ledger.volume_moved += moved - before - run->fluid.solved_volume - run->fluid.given_back;
     if (scene->fluid.air_pressure > 0)
         silt_pockets_advance(&run->pockets, scene, mesh, run->x_old, nodes->x);
+    potential_add(run, 1);
     silt_nodes_shuffle(nodes, mesh, scene, run->step);
     silt_memory_take(&run->memory, mesh, nodes);
     silt_run_levels_thin(run);
@@ -314,6 +324,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     memcpy(run->debt_before, nodes->debt, (size_t)nodes->count * sizeof(double));
     run->memory.record = true;
     SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
+    potential_add(run, -1);
     double lost[3];
     SILT_CLOCKED(handover,
                  silt_momentum_hand_on(&run->memory, mesh, nodes, rho, NULL, run->debt_before, run->v_before, run->map, lost));

@@ -200,8 +200,46 @@ static void water_restore(silt_run *run) {
     const size_t n = (size_t)run->nodes.count;
     memcpy(run->nodes.v, run->v_old, (size_t)silt_nodes_dim(&run->nodes) * n * sizeof(double));
     memcpy(run->nodes.debt, run->debt_old, n * sizeof(double));
+    memcpy(run->nodes.p, run->p_old, n * sizeof(double));
     silt_pressure_forget(run->fluid.pressure);
     silt_stiff_forget(run->fluid.stiff);
+}
+
+// force and torque of the water on body b: the reaction of its nodes, turned round. @return false: it is dry
+static bool water_on_body(const silt_run *run, int b, double force[2], double *torque) {
+    const struct silt_body *body = &silt_coupling_dem.bodies(run->coupling)->body[b];
+    bool wet = false;
+    force[0] = force[1] = *torque = 0;
+    for (int i = 0; i < run->nodes.count; i++) {
+        if (run->nodes.kind[i] != NODE_BODY || run->nodes.owner[i] != b || !run->mesh.wet[i])
+            continue;
+        const double fx = -run->fluid.reaction[2 * i], fy = -run->fluid.reaction[2 * i + 1];
+        force[0] += fx;
+        force[1] += fy;
+        *torque += (run->nodes.x[2 * i] - body->x[0]) * fy - (run->nodes.x[2 * i + 1] - body->x[1]) * fx;
+        wet = true;
+    }
+    return wet;
+}
+
+// a force that would carry a free body over a cell from rest, or turn it as far, is none: the water's step has failed. LIGGGHTS
+// would lose the body without a word.
+static silt_status loads_sane(const silt_run *run, silt_error *err) {
+    const silt_scene *scene = run->scene;
+    const silt_body_state *bodies = run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
+    for (int b = 0; bodies && b < bodies->count; b++) {
+        const struct silt_body *body = &bodies->body[b];
+        double force[2], torque, reach = 0;
+        if (scene->body[b].motion == MOTION_FIXED || !water_on_body(run, b, force, &torque))
+            continue;
+        for (int k = 0; k < body->n_point; k++)
+            reach = silt_max(reach, hypot(body->outline[2 * k], body->outline[2 * k + 1]));
+        const double way = silt_square(run->dt) * (silt_length(2, force) / body->mass + fabs(torque) * reach / body->inertia);
+        if (!(way < scene->fluid.size))
+            return silt_fail(err, SILT_FAILED, "the water's force (%.3g, %.3g) N and torque %.3g N m would throw body '%s' at (%g, %g) over %.2g cells in a step",
+                             force[0], force[1], torque, scene->body[b].name, body->x[0], body->x[1], way / scene->fluid.size);
+    }
+    return SILT_OK;
 }
 
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
@@ -225,6 +263,8 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         status = silt_fluid_step(&run->fluid, &step, err);
         silt_clock_to(CLOCK_rest);
         if (status == SILT_OK)
+            status = loads_sane(run, err);
+        if (status == SILT_OK)
             return SILT_OK;
         water_restore(run);
         const bool least = run->coupling && *n <= 1;
@@ -247,7 +287,7 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
     }
 }
 
-// What the water does to bodies: the reaction of their nodes, turned round. The water saw the body's last change of speed
+// What the water does to bodies. The water saw the body's last change of speed
 // as its acceleration and answers with its added mass, and with theta below 1 it rings on: the body takes only the share of
 // a new force that leaves this loop stable whatever its contacts do; a steady force comes through whole. before: last
 // step, s
@@ -258,17 +298,8 @@ static void load_bodies(silt_run *run, double before) {
     const double most = silt_max(2 - 1 / theta, 0.1); // half of what the linear loop bears
     for (int b = 0; b < bodies->count; b++) {
         struct silt_body *body = &bodies->body[b];
-        double force[2] = {0, 0}, torque = 0, reach = 0;
-        bool wet = false;
-        for (int i = 0; i < run->nodes.count; i++) {
-            if (run->nodes.kind[i] != NODE_BODY || run->nodes.owner[i] != b || !run->mesh.wet[i])
-                continue;
-            const double fx = -run->fluid.reaction[2 * i], fy = -run->fluid.reaction[2 * i + 1];
-            force[0] += fx;
-            force[1] += fy;
-            torque += (run->nodes.x[2 * i] - body->x[0]) * fy - (run->nodes.x[2 * i + 1] - body->x[1]) * fx;
-            wet = true;
-        }
+        double force[2], torque, reach = 0;
+        const bool wet = water_on_body(run, b, force, &torque);
         for (int k = 0; k < body->n_point; k++)
             reach = silt_max(reach, hypot(body->outline[2 * k], body->outline[2 * k + 1]));
         // added mass and inertia: those of the disc around it
@@ -305,6 +336,24 @@ static silt_status step_sane(const silt_run *run, double wanted, silt_error *err
         return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s: the water's volume is off by %.0f %%; no result after this is worth having",
                          (long long)run->step + 1, run->time, 100 * run->ledger.volume_error);
     return SILT_OK;
+}
+
+// what the discrete elements say, with the step and the speed and load of every body that could be the cause
+static silt_status grains_failed(const silt_run *run, silt_status status, silt_error *err) {
+    if (!err)
+        return status;
+    char why[sizeof err->text];
+    snprintf(why, sizeof why, "%s", err->text);
+    *err = (silt_error){0};
+    silt_fail(err, status, "step %lld at t = %.9g s, dt = %.3g s: %s", (long long)run->step + 1, run->time, run->dt, why);
+    const silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    for (int b = 0; b < bodies->count; b++) {
+        const struct silt_body *body = &bodies->body[b];
+        const size_t used = strlen(err->text);
+        snprintf(err->text + used, sizeof err->text - used, "\nbody '%s' was at (%g, %g) with the velocity (%.3g, %.3g) m/s; force of the water (%.3g, %.3g) N",
+                 run->scene->body[b].name, body->x[0], body->x[1], body->v[0], body->v[1], body->force[0], body->force[1]);
+    }
+    return status;
 }
 
 static silt_status run_step(silt_run *run, silt_error *err) {
@@ -352,7 +401,8 @@ static silt_status run_step(silt_run *run, silt_error *err) {
             if (status == SILT_OK)
                 status = silt_coupling_dem.finish(run->coupling, err);
         });
-        SILT_TRY(status);
+        if (status != SILT_OK)
+            return grains_failed(run, status, err);
         if (scene->bed.on)
             SILT_CLOCKED(bed, status = silt_run_deposit(run, err));
         SILT_TRY(status);
