@@ -90,12 +90,21 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
     f->n_cell = n_cell;
 }
 
-// largest mu theta dt/(rho h^2)
+// mu theta dt/(rho h^2): the largest, and the mean over the water
 static double stiffness(const silt_fluid *f, const silt_step *s) {
     double mu = 0;
     for (int e = 0; e < f->n_cell; e++)
         mu = silt_max(mu, f->mu[e]);
     return mu * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
+}
+
+static double mean_stiffness(const silt_fluid *f, const silt_step *s) {
+    double mu = 0, volume = 0;
+    for (int e = 0; e < f->n_cell; e++) {
+        mu += f->cell_volume[e] * f->mu[e];
+        volume += f->cell_volume[e];
+    }
+    return mu / volume * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
 }
 
 // acceleration besides gravity, half way through the step
@@ -431,6 +440,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
     const silt_fluid_def *def = &s->scene->fluid;
     const bool consistent = def->pressure == PRESSURE_CONSISTENT;
     const int D = f->dim;
+    const bool direct = D == 2 && consistent && def->scheme == SCHEME_IMPLICIT; // momentum and continuity can be factored as one
     const size_t bytes = (size_t)D * (size_t)f->n_node * sizeof(double);
     double before = HUGE_VAL;
     // a first pressure has nothing to start from
@@ -450,8 +460,8 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             silt_mobile_find(f, s->mesh, p);
             f->seconds_assemble += silt_seconds() - tick;
             tick = silt_seconds();
-            whole = D == 2 && consistent && def->scheme == SCHEME_IMPLICIT && stiffness(f, s) > FLUID_STIFF;
-            SILT_TRY(silt_pressure_factor(f->pressure, f, s, stiffness(f, s) > FLUID_STIFF && !whole, err));
+            whole = direct && mean_stiffness(f, s) > FLUID_STIFF; // a stiff cell here and there is no reason
+            SILT_TRY(silt_pressure_factor(f->pressure, f, s, !direct && stiffness(f, s) > FLUID_STIFF, err));
             f->seconds_solve += silt_seconds() - tick;
             tick = silt_seconds();
             if (f->theta < 0.75 && !s->drag)
@@ -519,7 +529,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         tick = silt_seconds();
         if (!whole)
             correct(f, s, f->increment, f->w);
-        if (stiff > FLUID_STIFF && !whole)
+        if (stiff > FLUID_STIFF && !direct)
             SILT_TRY(correct_stiff(f, err));
         for (int i = 0; i < f->n_node; i++)
             p[i] += f->increment[i];
