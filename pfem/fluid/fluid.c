@@ -4,6 +4,7 @@
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
 #define FLUID_FACTOR 5.0     // the same, from which a factor of the momentum pays
 #define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
+#define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 
@@ -177,7 +178,7 @@ static void resist(silt_fluid *f, const silt_step *s) {
         silt_wall_law_traction(&f->law, s->scene, f->dim, f->w, f->friction, f->wall_force);
     }
     silt_assemble_geometry(f, s, s->dt);
-    if (silt_viscosity_varies(s->scene))
+    if (silt_viscosity_varies(s->scene) && (f->iterations < FLUID_CLOSURE || s->scene->fluid.rheology != RHEOLOGY_NEWTONIAN))
         silt_viscosity_update(s->scene, s->nodes, s->mesh, &f->depth, f->flux, f->inverse, f->w, f->iterations ? 0.5 : 1, f->mu,
                               &f->viscosity);
 }
@@ -200,13 +201,13 @@ static void resist_begin(silt_fluid *f, const silt_step *s) {
 }
 
 // velocity with the pressure of the last iterate, from the right side in f->force
-static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid, silt_error *err) {
+static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid, double drop, silt_error *err) {
     const int D = f->dim;
     if (s->scene->fluid.scheme == SCHEME_IMPLICIT && viscid) {
         memcpy(f->star, f->w, (size_t)D * (size_t)f->n_node * sizeof(double));
         for (int i = 0; i < f->n_node && f->wall_normals.n_row; i++)
             silt_hold_impose(f, i, f->star + D * i); // normals that have changed with the midpoint mesh
-        SILT_TRY(silt_momentum_solve(f, s, f->force, f->star, err));
+        SILT_TRY(silt_momentum_solve(f, s, f->force, drop, f->star, err));
     } else {
         if (viscid)
             silt_assemble_viscous(f, s->mesh, f->w, -1, f->force);
@@ -484,7 +485,8 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             find_excess(f, s, f->force);
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
-        SILT_TRY(velocity_star(f, s, stiff > 0, err));
+        // far from the end of the iterations the momentum is not worth more than the pressure
+        SILT_TRY(velocity_star(f, s, stiff > 0, f->iterations && before > 10 * def->tolerance ? 1e-3 : 0, err));
         if (f->shift)
             for (int k = 0; k < D * f->n_node; k++)
                 f->scratch[k] = f->star[k] + f->shift[k];
@@ -550,7 +552,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         f->pressure = silt_pressure_create();
     f->theta = def->theta;
     f->seconds_assemble = f->seconds_solve = 0;
-    f->iterations = f->pressure_iterations = 0;
+    f->iterations = f->momentum_iterations = f->pressure_iterations = 0;
     f->projected = 0;
     memset(f->impulse, 0, sizeof f->impulse);
     silt_hold_nodes(f, s);
