@@ -57,7 +57,8 @@ void silt_debts_ask(silt_fluid *f, const silt_step *s) {
             debt[i] += change[i];
     }
     for (int i = 0; i < f->n_node; i++)
-        if (mesh->wet[i])
+        // with the Laplacian the surface's nodes cannot be asked
+        if (mesh->wet[i] && !(mesh->surface[i] && s->scene->fluid.pressure == PRESSURE_LAPLACIAN))
             f->rate[i] = silt_clamp(debt[i], -DEBT_CAP * f->volume[i], DEBT_CAP * f->volume[i]) / time;
     keep_closed(f, mesh);
 }
@@ -73,11 +74,14 @@ bool silt_debts_relent(silt_fluid *f) {
 }
 
 void silt_mobile_find(silt_fluid *f, const silt_mesh *mesh, double *p) {
-    // a node whose whole surroundings are held has no say in its volume
+    // a node whose whole surroundings are held has no say in its volume. But in the corner of a lid it keeps its equation, which the
+    // smoothing meets: what the lid drags into that corner and out of the other must have its like, or a closed tank cannot be full
     for (int i = 0; i < f->n_node; i++) {
         f->mobile[i] = 0;
-        for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++)
-            f->mobile[i] |= f->hold[mesh->neighbour[k]] != HOLD_ALL;
+        for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++) {
+            const int j = mesh->neighbour[k];
+            f->mobile[i] |= f->hold[j] != HOLD_ALL || (f->belt && silt_length(f->dim, f->belt + f->dim * j) > 0);
+        }
         if (!f->mobile[i])
             f->rate[i] = 0;
     }

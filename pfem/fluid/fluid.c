@@ -4,12 +4,13 @@
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
 #define FLUID_FACTOR 5.0     // the same, from which a factor of the momentum pays
 #define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
+#define EXPLICIT_SHARE 0.02 // of the water that may be too stiff for explicit viscosity: slivers
 #define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 
 void silt_fluid_clear(silt_fluid *f) {
-    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->inverse, f->mu, f->tau, f->share, f->belt, f->wall_force, f->shift, f->mass, f->volume,
+    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
                        f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->normal, f->given, f->cg[0],
                        f->cg[1], f->cg[2]};
@@ -54,6 +55,7 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         ROOM(inertia, 1, have_nodes, need);
         ROOM(friction, 1, have_nodes, need);
         ROOM(residual, 1, have_nodes, need);
+        ROOM(stand, 1, have_nodes, need);
         ROOM(rate, 1, have_nodes, need);
         ROOM(increment, 1, have_nodes, need);
         ROOM(hold, 1, have_nodes, need);
@@ -79,6 +81,8 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         f->share = NULL;
         f->share_capacity = 0;
     }
+    if (s->scene->fluid.force.kind == FORMULA_CENTRAL && !s->drag)
+        SILT_RESERVE(f->potential, f->potential_capacity, n_node + 1);
     bool belts = false;
     for (int k = 0; k < s->scene->n_wall; k++)
         for (int d = 0; d < 3; d++)
@@ -108,9 +112,13 @@ static double mean_stiffness(const silt_fluid *f, const silt_step *s) {
     return mu / volume * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
 }
 
-// acceleration besides gravity, half way through the step
+// acceleration besides gravity that is loaded at the nodes, half way through the step. A central one is not: its potential is
+// taken as a P1 field (silt_assemble_potential), since rest under a load at the nodes is true to h^2 only.
 static void body_force(const silt_fluid *f, const silt_step *s, int i, double a[3]) {
-    silt_formula_acceleration(&s->scene->fluid.force, s->time + 0.5 * s->dt, f->x_mid + f->dim * i, a);
+    if (f->potential)
+        memcpy(a, s->scene->fluid.force.vector, 3 * sizeof *a);
+    else
+        silt_formula_acceleration(&s->scene->fluid.force, s->time + 0.5 * s->dt, f->x_mid + f->dim * i, a);
 }
 
 // Lumped masses make waves slow, by 0.3 % at 40 nodes a wave. One sweep towards the consistent mass: with the acceleration
@@ -134,7 +142,7 @@ static void find_excess(silt_fluid *f, const silt_step *s, const double *right) 
     for (int i = 0; i < f->n_node; i++) {
         for (int d = 0; d < D; d++)
             a[D * i + d] = s->mesh->wet[i] && f->mass[i] > 0 ? a[D * i + d] / f->mass[i] : 0;
-        // a body force is loaded at the nodes, not as a P1 field: it has no excess, whatever holds the nodes
+        // such a body force is loaded at the nodes, not as a P1 field: it has no excess, whatever holds the nodes
         silt_hold_project(f, i, a + D * i);
         if (s->scene->fluid.force.kind != FORMULA_NONE) {
             double b[3];
@@ -160,6 +168,8 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
             for (int d = 0; d < D; d++)
                 out[D * i + d] += f->mass[i] * a[d];
         }
+    if (f->potential)
+        silt_assemble_potential(f, s->mesh, out);
     if (f->law.n_point)
         for (int k = 0; k < D * f->n_node; k++)
             out[k] += f->wall_force[k];
@@ -207,13 +217,16 @@ static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid,
         memcpy(f->star, f->w, (size_t)D * (size_t)f->n_node * sizeof(double));
         for (int i = 0; i < f->n_node && f->wall_normals.n_row; i++)
             silt_hold_impose(f, i, f->star + D * i); // normals that have changed with the midpoint mesh
-        SILT_TRY(silt_momentum_solve(f, s, f->force, drop, f->star, err));
+        silt_status status;
+        SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, drop, f->star, err));
+        SILT_TRY(status);
     } else {
         if (viscid)
             silt_assemble_viscous(f, s->mesh, f->w, -1, f->force);
         for (int i = 0; i < f->n_node; i++) {
+            const double stand = viscid ? f->stand[i] : 0;
             for (int d = 0; d < D; d++)
-                f->star[D * i + d] = f->force[D * i + d] / f->inertia[i];
+                f->star[D * i + d] = (f->force[D * i + d] + stand * f->w[D * i + d]) / (f->inertia[i] + stand);
             silt_hold_impose(f, i, f->star + D * i);
         }
     }
@@ -260,12 +273,11 @@ static void correct(silt_fluid *f, const silt_step *s, const double *q, double *
 
 // increment = -matrix^-1 residual
 static silt_status pressure_increment(silt_fluid *f, const silt_step *s, double tolerance, silt_error *err) {
-    const double tick = silt_seconds();
+    silt_status status;
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
-    SILT_TRY(silt_pressure_solve(f->pressure, f, s, f->residual, tolerance, f->increment, err));
-    f->seconds_solve += silt_seconds() - tick;
-    return SILT_OK;
+    SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, s, f->residual, tolerance, f->increment, err));
+    return status;
 }
 
 static double kinetic_energy(const silt_fluid *f, const silt_step *s, const double *v) {
@@ -288,11 +300,10 @@ static silt_status project_start(silt_fluid *f, const silt_step *s, const double
             silt_hold_turn(f, i, v + D * i);
     silt_assemble_projection(f, s->mesh, p);
     const double before = kinetic_energy(f, s, v);
-    for (int pass = 0; pass < 2; pass++) {
-        silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
-        SILT_TRY(pressure_increment(f, s, 1e-2, err));
-        correct(f, s, f->increment, v);
-    }
+    // once: what is left is the smoothing's, and more of it makes the pressure rougher
+    silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
+    SILT_TRY(pressure_increment(f, s, 1e-2, err));
+    correct(f, s, f->increment, v);
     f->projected = before - kinetic_energy(f, s, v);
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i])
@@ -308,7 +319,7 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
     for (int i = 0; i < f->n_node && !any; i++)
         any = f->rate[i] != 0;
     memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);
-    for (int pass = 0; pass < 4 && any; pass++) {
+    for (int pass = 0; pass < 2 && any; pass++) {
         memset(f->increment, 0, (size_t)f->n_node * sizeof *f->increment);
         silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
         for (int i = 0; i < f->n_node; i++)
@@ -383,23 +394,24 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
 // stiff viscosity: the pressure's operator is nearly the mass matrix over the viscosity, its inverse adds to that of S + L
 // (Cahouet and Chabard, Int. J. Numer. Meth. Fluids 8, 1988)
 static silt_status correct_stiff(silt_fluid *f, silt_error *err) {
-    const double tick = silt_seconds();
-    SILT_TRY(silt_pressure_solve_stiff(f->pressure, f->residual, f->scratch, err));
+    silt_status status;
+    SILT_CLOCKED(solve, status = silt_pressure_solve_stiff(f->pressure, f->residual, f->scratch, err));
     for (int i = 0; i < f->n_node; i++)
         f->increment[i] += f->scratch[i];
-    f->seconds_solve += silt_seconds() - tick;
-    return SILT_OK;
+    return status;
 }
 
-// a node that came within the courant number and leaves by more than a cell: the step was too long for what happened in it
+// A node that came within the courant number and leaves by more than a cell: the step was too long for what happened in it. Where
+// no smaller step will follow, over ten cells: no result after that is worth having.
 static silt_status astray_node(const silt_fluid *f, const silt_step *s, silt_error *err) {
     const int D = f->dim;
-    for (int i = 0; i < f->n_node && !f->last_try; i++) {
-        const double h = silt_node_h(s->nodes, i, s->scene->fluid.size);
-        if (!s->mesh->wet[i] || silt_length(D, f->w + D * i) * s->dt < 1.5 * h || silt_length(D, s->nodes->v + D * i) * s->dt > h)
+    const double most = f->last_try ? 10 : 1.5;
+    for (int i = 0; i < f->n_node; i++) {
+        const double h = silt_node_h(s->nodes, i, s->scene->fluid.size), way = silt_length(D, f->w + D * i) * s->dt;
+        if (!s->mesh->wet[i] || way < most * h || (!f->last_try && silt_length(D, s->nodes->v + D * i) * s->dt > h))
             continue;
-        return silt_fail(err, SILT_FAILED, "a node at (%g, %g) would be thrown over %.1f cells in a step", s->nodes->x[D * i],
-                         s->nodes->x[D * i + 1], silt_length(D, f->w + D * i) * s->dt / h);
+        return silt_fail(err, SILT_FAILED, "a node at (%g, %g) would be thrown over %.3g cells in a step", s->nodes->x[D * i],
+                         s->nodes->x[D * i + 1], way / h);
     }
     return SILT_OK;
 }
@@ -419,22 +431,46 @@ static bool choose_theta(silt_fluid *f, const silt_step *s) {
 
 // the momentum, or momentum and continuity as one system; once a step unless viscosity changes
 static silt_status factor_stiff(silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
-    const double tick = silt_seconds();
+    silt_status status;
     if (silt_stiff_ready(f->stiff, pressure) && !silt_viscosity_varies(s->scene))
         return SILT_OK;
-    SILT_TRY(silt_stiff_factor(&f->stiff, f, s, pressure, err));
-    f->seconds_solve += silt_seconds() - tick;
-    return SILT_OK;
+    SILT_CLOCKED(factor, status = silt_stiff_factor(&f->stiff, f, s, pressure, err));
+    return status;
 }
 
 static silt_status correct_whole(silt_fluid *f, const silt_step *s, silt_error *err) {
+    silt_status status;
     SILT_TRY(factor_stiff(f, s, true, err));
-    const double tick = silt_seconds();
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
-    SILT_TRY(silt_stiff_correct(f->stiff, f, f->residual, f->increment, f->w, err));
-    f->seconds_solve += silt_seconds() - tick;
-    return SILT_OK;
+    SILT_CLOCKED(solve, status = silt_stiff_correct(f->stiff, f, f->residual, f->increment, f->w, err));
+    return status;
+}
+
+// Explicit viscosity: f->stand holds the nodes that it would make unstable (point by point implicit, the fixed point is the same);
+// a step in which that is more than what stands in slivers is too long. Two passes are the midpoint rule, which stands steps of 2
+// over the largest eigenvalue of M^-1 K: at most twice the largest share of the diagonal (square lattice; 1.5 on even triangles).
+static silt_status explicit_limit(silt_fluid *f, const silt_step *s, silt_error *err) {
+    double held = 0, all = 0;
+    memset(f->stand, 0, (size_t)f->n_node * sizeof *f->stand);
+    silt_assemble_viscous_diagonal(f, s->mesh, f->stand);
+    for (int i = 0; i < f->n_node; i++) {
+        f->stand[i] = silt_max(0, 2 * f->stand[i] - f->inertia[i]);
+        all += s->mesh->wet[i] ? f->volume[i] : 0;
+        held += f->stand[i] > 0 && f->hold[i] != HOLD_ALL ? f->volume[i] : 0;
+    }
+    if (held <= EXPLICIT_SHARE * all)
+        return SILT_OK;
+    return silt_fail(err, SILT_FAILED, "a step of %.3g s is too long for explicit viscosity (fluid.scheme: implicit knows no limit)", s->dt);
+}
+
+// the largest way that an iterate's change of velocity makes in the step, over the local size: continuity does not see what swirls
+static double swirl(const silt_fluid *f, const silt_step *s) {
+    double most = 0;
+    for (int i = 0; i < f->n_node; i++)
+        for (int d = 0; d < f->dim && s->mesh->wet[i]; d++)
+            most = silt_max(most, fabs(f->star[f->dim * i + d] - f->w[f->dim * i + d]) / silt_node_h(s->nodes, i, s->scene->fluid.size));
+    return most * s->dt;
 }
 
 static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, silt_error *err) {
@@ -451,22 +487,28 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         first = p[i] == 0;
     const int most = def->iterations * (first ? 10 : 1);
     for (f->iterations = 0;; f->iterations++) {
-        double tick = silt_seconds();
+        silt_status status;
         if (s->drag && s->drag->update)
-            s->drag->update(s->drag->self, f->w, p, s->dt);
+            SILT_CLOCKED(coupling, s->drag->update(s->drag->self, f->w, p, s->dt));
         resist(f, s);
         if (f->iterations == 0) {
             if (choose_theta(f, s))
                 silt_assemble_geometry(f, s, s->dt);
+            if (def->scheme == SCHEME_FRACTIONAL)
+                SILT_TRY(explicit_limit(f, s, err));
             silt_mobile_find(f, s->mesh, p);
-            f->seconds_assemble += silt_seconds() - tick;
-            tick = silt_seconds();
             whole = direct && mean_stiffness(f, s) > FLUID_STIFF; // a stiff cell here and there is no reason
-            SILT_TRY(silt_pressure_factor(f->pressure, f, s, !direct && stiffness(f, s) > FLUID_STIFF, err));
-            f->seconds_solve += silt_seconds() - tick;
-            tick = silt_seconds();
-            if (f->theta < 0.75 && !s->drag)
-                SILT_TRY(project_start(f, s, p, err));
+            SILT_CLOCKED(matrix,
+                         status = silt_pressure_factor(f->pressure, f, s, !direct && stiffness(f, s) > FLUID_STIFF, err));
+            SILT_TRY(status);
+            if (f->theta < 0.75 && !s->drag) {
+                // a first pressure, nought, does not balance the smoothing of the potential
+                double *potential = f->potential;
+                f->potential = first ? NULL : potential;
+                status = project_start(f, s, p, err);
+                f->potential = potential;
+                SILT_TRY(status);
+            }
             if (f->shift) {
                 silt_assemble_geometry(f, s, s->dt);
                 SILT_TRY(shift_find(f, s, err));
@@ -491,13 +533,13 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             for (int k = 0; k < D * f->n_node; k++)
                 f->scratch[k] = f->star[k] + f->shift[k];
         silt_assemble_continuity(f, s->mesh, s->drag, f->rate, f->shift ? f->scratch : f->star, p);
-        f->seconds_assemble += silt_seconds() - tick;
 
         const int worst_node = worst_residual(f, s);
         const double *place = s->nodes->x + D * worst_node;
         if (!isfinite(f->worst))
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
-        const bool fine = f->worst <= (first ? 0.1 : 1) * def->tolerance;
+        const bool passed = def->scheme == SCHEME_IMPLICIT || stiff == 0 || f->iterations > 0;
+        const bool fine = passed && f->worst <= (first ? 0.1 : 1) * def->tolerance && (!first || swirl(f, s) <= def->tolerance);
         // at the end of the iterations a small residual is accepted; a first pressure takes longer to meet its projection
         if (fine || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);
@@ -528,7 +570,6 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             SILT_TRY(correct_whole(f, s, err));
         else
             SILT_TRY(pressure_increment(f, s, 0.01, err));
-        tick = silt_seconds();
         if (!whole)
             correct(f, s, f->increment, f->w);
         if (stiff > FLUID_STIFF && !direct)
@@ -539,7 +580,6 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             silt_mix_next(f->mix, D, f->n_node, f->increment, f->residual, p, f->w);
         if (refresh)
             silt_assemble_projection(f, s->mesh, p);
-        f->seconds_assemble += silt_seconds() - tick;
     }
 }
 
@@ -551,7 +591,6 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     if (!f->pressure)
         f->pressure = silt_pressure_create();
     f->theta = def->theta;
-    f->seconds_assemble = f->seconds_solve = 0;
     f->iterations = f->momentum_iterations = f->pressure_iterations = 0;
     f->projected = 0;
     memset(f->impulse, 0, sizeof f->impulse);
@@ -590,6 +629,8 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
             nodes->p[i] = p[i];
             f->solved_volume += f->residual[i] * s->dt;
             nodes->debt[i] -= (f->rate[i] + (f->mobile[i] != 1 ? f->withheld[i] : 0)) * s->dt;
+            if (def->pressure == PRESSURE_LAPLACIAN && s->mesh->surface[i]) // no continuity there: what the node gained
+                nodes->debt[i] -= f->residual[i] * s->dt;
             f->given_back += f->rate[i] * s->dt;
             if (!s->mesh->wet[i])
                 continue;

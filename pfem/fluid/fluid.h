@@ -14,6 +14,7 @@ typedef struct silt_pressure silt_pressure; // the pressure matrix and its facto
 typedef struct silt_stiff silt_stiff;       // factors of momentum and continuity where viscosity is stiff, stiff.c
 typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
 
+
 /** what a step sees */
 typedef struct silt_step {
     const silt_scene *scene;
@@ -27,7 +28,8 @@ typedef struct silt_step {
 
 /** working space and results of a step; arrays grow only */
 typedef struct silt_fluid {
-    int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity;
+    int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity,
+        potential_capacity;
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
@@ -37,6 +39,8 @@ typedef struct silt_fluid {
     double *share;        // owned, dim + 1 per cell, int of solid share times N_i over the volume; NULL without grains
     double *wall_force;   // owned, dim per node, N, explicit part of the law of the wall's traction; NULL without such walls
     double *shift;        // owned, dim per node, m/s: carries positions, not momentum, to where debts are paid; NULL without volume control
+    double *stand;        // owned, per node, kg/s, added to both sides where explicit viscosity would not be stable
+    double *potential;    // owned, per node, Pa, density times the potential of a central body force at x_mid; NULL without one
     double *belt;         // owned, dim per node, velocity of a wall's surface along itself; NULL without such walls
     double *mass;         // owned, per node, lumped mass of water, kg
     double *volume;       // owned, per node, lumped volume of the cells
@@ -75,7 +79,6 @@ typedef struct silt_fluid {
     double given_back;        // m3, volume that the debts asked for
     double momentum_residual; // N, unbalanced force on free nodes
     double momentum_scale;    // N, what it is relative to
-    double seconds_assemble, seconds_solve;
 } silt_fluid;
 
 void silt_fluid_clear(silt_fluid *fluid);
@@ -106,16 +109,18 @@ void silt_hold_impose(const silt_fluid *fluid, int i, double *v);
 void silt_assemble_geometry(silt_fluid *fluid, const silt_step *step, double dt);
 /** out += G p; adds to lost (may be NULL) what acts on the grains */
 void silt_assemble_pressure(const silt_fluid *fluid, const silt_mesh *mesh, const double *p, double *out, double *lost);
+/** out -= int N_i grad potential: at rest the pressure answers it to rounding, on any mesh */
+void silt_assemble_potential(const silt_fluid *fluid, const silt_mesh *mesh, double *out);
 /** out += factor K v: viscous force, deviatoric */
 void silt_assemble_viscous(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, double factor, double *out);
 /** diagonal += diagonal of K, its mean over the components */
 void silt_assemble_viscous_diagonal(const silt_fluid *fluid, const silt_mesh *mesh, double *diagonal);
 /** out += (lumped - consistent mass) a */
 void silt_assemble_mass_excess(const silt_fluid *fluid, const silt_mesh *mesh, double density, const double *a, double *out);
-/** residual of continuity: G^T v + L p + Q pi - source - rate (NULL: 0); where no velocity can mend it, of its smoothing alone */
+/** residual of continuity, p with the potential of a central force: G^T v + L p + Q pi - source - rate (NULL: 0); where no velocity can mend it, of its smoothing alone */
 void silt_assemble_continuity(silt_fluid *fluid, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
                               const double *p);
-/** pi = -M^-1 Q^T p: the recovered pressure gradient, lumped */
+/** pi = -M^-1 Q^T p: the recovered gradient, lumped, of the pressure with the potential of a central force */
 void silt_assemble_projection(silt_fluid *fluid, const silt_mesh *mesh, const double *p);
 /** out = G^T v + L p, without sources and projection (the pressure system applied) */
 void silt_assemble_divergence(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, const double *p, double *out);

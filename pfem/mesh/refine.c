@@ -8,6 +8,7 @@
 #define REFINE_SURFACE 0.35 // this: the surface's shape hangs on them; up to the former where the surface is so flat that
 #define REFINE_SHAPE 0.01   // less than this times h^dim comes or goes with the node
 #define REFINE_FLAT 0.25    // a node nearer to a wall than this times h is pressed out
+#define REFINE_SMOOTH 0.7   // cosine of the largest bend of the free surface over which a cubic is laid
 #define REFINE_UNDER 0.1    // in space a node from within nearer than this times h to the free surface: slivers would follow, and go
 #define REFINE_CREASE 1.5   // edges along creases that are longer than this times h get nodes
 #define REFINE_ROOM 0.6     // but no node comes inside nearer than this times h to another
@@ -440,10 +441,51 @@ static bool refine_along_wedge(const refinement *r, int a, int b) {
     return r->dim == 2 && (both || refine_walls(r, a, b, wall) > 0);
 }
 
+// way from node a to the node before it on the free surface, seen from b. @return its length, 0: there is none
+static double refine_before(const refinement *r, int a, int b, int *node, double way[3]) {
+    int before = -1;
+    for (int k = r->facet_start[a]; k < r->facet_start[a + 1]; k++) {
+        const int *facet = r->mesh->facet[r->facet[k]], j = facet[0] == a ? facet[1] : facet[0];
+        if (r->mesh->facet_kind[r->facet[k]] != FACET_FREE || (j != b && before >= 0))
+            return 0;
+        before = j != b ? j : before;
+    }
+    if (before < 0)
+        return 0;
+    refine_apart(r, a, r->nodes->x + 2 * before, way);
+    *node = before;
+    return hypot(way[0], way[1]);
+}
+
+// A node that comes on the free surface, in 2-D, lies on the cubic through the edge's ends and their neighbours. On the chord it
+// would be a dent, and a surface that is accelerated towards the water tears open from dents. Its velocity likewise: more is what
+// it has beyond that of the edge.
+static void refine_bend(const refinement *r, int a, int b, double share, double x[3], double more[3]) {
+    double d[3], u[3], w[3];
+    int p = -1, q = -1;
+    refine_apart(r, a, r->nodes->x + 2 * b, d);
+    const double length = hypot(d[0], d[1]), before = refine_before(r, a, b, &p, u), after = refine_before(r, b, a, &q, w);
+    if (before < 0.2 * length || after < 0.2 * length || u[0] * d[0] + u[1] * d[1] > -REFINE_SMOOTH * before * length ||
+        w[0] * d[0] + w[1] * d[1] < REFINE_SMOOTH * after * length)
+        return;
+    // heights of the neighbours over the chord; their shares by Lagrange in the length along the four points
+    const double n[2] = {-d[1] / length, d[0] / length}, t = share * length, end = length + after;
+    const double first = t * (t - length) * (t - end) / (-before * (before + length) * (before + end));
+    const double last = (t + before) * t * (t - length) / ((end + before) * end * after);
+    const double height = first * (u[0] * n[0] + u[1] * n[1]) + last * (w[0] * n[0] + w[1] * n[1]);
+    const double off = silt_clamp(height, -0.15 * length, 0.15 * length), *v = r->nodes->v;
+    for (int c = 0; c < 2; c++) {
+        const double slope = (v[2 * b + c] - v[2 * a + c]) / length;
+        more[c] = first * (v[2 * p + c] - v[2 * a + c] + slope * before) + last * (v[2 * q + c] - v[2 * b + c] - slope * after);
+    }
+    x[0] += off * n[0];
+    x[1] += off * n[1];
+}
+
 static void refine_insert(refinement *r, int a, int b, double share, bool closed, const int *around, int n_around) {
     silt_nodes *nodes = r->nodes;
     const int dim = r->dim;
-    double d[3], x[3] = {0};
+    double d[3], x[3] = {0}, more[3] = {0};
     int wall[3];
     refine_apart(r, a, nodes->x + dim * b, d);
     for (int c = 0; c < dim; c++)
@@ -452,6 +494,8 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
     const int n_wall = closed ? 0 : refine_walls(r, a, b, wall);
     if (n_wall)
         refine_onto(r, n_wall, wall, x);
+    else if (dim == 2 && !closed)
+        refine_bend(r, a, b, share, x, more);
     const double h = refine_h(r, a, b);
     const bool surface = !closed && r->mesh->surface[a] && r->mesh->surface[b], wedge = !closed && refine_along_wedge(r, a, b);
     const int rank = (n_wall >= 2 ? 4 : n_wall) + (surface ? 2 : 0);
@@ -462,7 +506,7 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
         return;
     const int i = silt_nodes_add(nodes, NODE_FLUID, -1, x);
     for (int c = 0; c < dim; c++)
-        nodes->v[dim * i + c] = (1 - share) * nodes->v[dim * a + c] + share * nodes->v[dim * b + c];
+        nodes->v[dim * i + c] = (1 - share) * nodes->v[dim * a + c] + share * nodes->v[dim * b + c] + more[c];
     nodes->p[i] = (1 - share) * nodes->p[a] + share * nodes->p[b];
     if (nodes->h)
         nodes->h[i] = (1 - share) * silt_node_h(nodes, a, r->h) + share * silt_node_h(nodes, b, r->h);

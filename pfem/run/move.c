@@ -251,6 +251,15 @@ static void remember_bed(silt_run *run) {
             run->bed.fluid_node[k] = -1; // water now
 }
 
+// In a central force field it is the pressure with the potential that is smooth: that is what nodes that come get the mean of.
+static void potential_add(silt_run *run, double sign) {
+    const silt_fluid_def *fluid = &run->scene->fluid;
+    silt_nodes *nodes = &run->nodes;
+    if (fluid->force.kind == FORMULA_CENTRAL)
+        for (int i = 0; i < nodes->count; i++)
+            nodes->p[i] += sign * fluid->density * silt_formula_potential(&fluid->force, nodes->x + silt_nodes_dim(nodes) * i);
+}
+
 silt_status silt_run_move(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     silt_nodes *nodes = &run->nodes;
@@ -258,7 +267,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     const double h = scene->fluid.size, rho = scene->fluid.density;
     const int n = nodes->count, D = silt_nodes_dim(nodes);
 
-    const double since = silt_seconds();
+    silt_clock_to(CLOCK_move);
     // material motion; all nodes, so that the old cells hold what continuity gave them
     const double before = silt_mesh_volume(mesh, nodes->x);
     let_go(run);
@@ -278,6 +287,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     run->ledger.volume_moved += moved - before - run->fluid.solved_volume - run->fluid.given_back;
     if (scene->fluid.air_pressure > 0)
         silt_pockets_advance(&run->pockets, scene, mesh, run->x_old, nodes->x);
+    potential_add(run, 1);
     silt_nodes_shuffle(nodes, mesh, scene, run->step);
     silt_memory_take(&run->memory, mesh, nodes);
 
@@ -305,10 +315,9 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     hand_on_landing(run, run->wall_before, run->v_before);
     let_out(run);
     expel(run);
-    silt_mesh_refine(mesh, nodes, &run->memory, h);
+    SILT_CLOCKED(refine, silt_mesh_refine(mesh, nodes, &run->memory, h));
 
-    const double middle = silt_seconds();
-    run->phase[PHASE_move] += middle - since;
+    silt_clock_to(CLOCK_index);
     SILT_RESERVE(run->map, run->map_capacity, nodes->count + 1);
     SILT_RESERVE(run->v_before, run->v_before_capacity, D * (nodes->count + 1));
     SILT_RESERVE(run->debt_before, run->debt_before_capacity, nodes->count + 1);
@@ -316,8 +325,10 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     memcpy(run->debt_before, nodes->debt, (size_t)nodes->count * sizeof(double));
     run->memory.record = true;
     SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
+    potential_add(run, -1);
     double lost[3];
-    silt_momentum_hand_on(&run->memory, mesh, nodes, rho, NULL, run->debt_before, run->v_before, run->map, lost);
+    SILT_CLOCKED(handover,
+                 silt_momentum_hand_on(&run->memory, mesh, nodes, rho, NULL, run->debt_before, run->v_before, run->map, lost));
     run->ledger.volume_reconnected += run->memory.reconnected;
     // without an outlet nothing may leave: what does anyway shows as a volume error
     if (scene->fluid.n_outlet)
@@ -325,9 +336,9 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     for (int k = 0; k < run->bed.n_node; k++)
         if (run->bed.fluid_node[k] >= 0)
             run->bed.fluid_node[k] = run->map[run->bed.fluid_node[k]];
-    silt_size_update(run->size, nodes, mesh);
+    SILT_CLOCKED(refine, silt_size_update(run->size, nodes, mesh));
     SILT_TRY(silt_run_pockets(run, err));
     silt_locator_build(&run->locator, mesh, nodes->x, h);
-    run->phase[PHASE_mesh] += silt_seconds() - middle;
+    silt_clock_to(CLOCK_rest);
     return SILT_OK;
 }

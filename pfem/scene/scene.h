@@ -376,6 +376,8 @@ bool silt_chain_crosses(int n, const double *point, bool closed, int crossing[2]
 void silt_formula_velocity(const silt_formula *formula, double g, const double *x, double *v);
 /** Acceleration of a body force at time and x, m/s2; x and a as above. */
 void silt_formula_acceleration(const silt_formula *formula, double time, const double *x, double *a);
+/** m2/s2, potential of a central acceleration at x, without `vector` */
+double silt_formula_potential(const silt_formula *formula, const double *x);
 /** height of the solitary wave's surface over still water at x[0], m */
 double silt_formula_surface(const silt_formula *formula, const double *x);
 /** Does once what every look-up would do anew: sorts the points of FORMULA_FIELD by place, so that a look-up takes
