@@ -181,6 +181,8 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
             out[k] += f->wall_force[k];
     for (int k = 0; f->level_force && k < D * f->n_node; k++)
         out[k] += f->level_force[k];
+    if (s->scene->fluid.surface_tension > 0)
+        silt_tension_force(s->mesh, f->x_mid, s->scene->fluid.surface_tension, out);
     if (s->pockets)
         silt_pockets_force(s->pockets, D, 0.5 * s->dt, f->w, out);
     silt_assemble_pressure(f, s->mesh, p, out, NULL);
