@@ -4,6 +4,7 @@
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
 #define FLUID_FACTOR 5.0     // the same, from which a factor of the momentum pays
 #define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
+#define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 
@@ -90,12 +91,21 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
     f->n_cell = n_cell;
 }
 
-// largest mu theta dt/(rho h^2)
+// mu theta dt/(rho h^2): the largest, and the mean over the water
 static double stiffness(const silt_fluid *f, const silt_step *s) {
     double mu = 0;
     for (int e = 0; e < f->n_cell; e++)
         mu = silt_max(mu, f->mu[e]);
     return mu * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
+}
+
+static double mean_stiffness(const silt_fluid *f, const silt_step *s) {
+    double mu = 0, volume = 0;
+    for (int e = 0; e < f->n_cell; e++) {
+        mu += f->cell_volume[e] * f->mu[e];
+        volume += f->cell_volume[e];
+    }
+    return mu / volume * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
 }
 
 // acceleration besides gravity, half way through the step
@@ -166,7 +176,7 @@ static void resist(silt_fluid *f, const silt_step *s) {
         silt_wall_law_traction(&f->law, s->scene, f->dim, f->w, f->friction, f->wall_force);
     }
     silt_assemble_geometry(f, s, s->dt);
-    if (silt_viscosity_varies(s->scene))
+    if (silt_viscosity_varies(s->scene) && (f->iterations < FLUID_CLOSURE || s->scene->fluid.rheology != RHEOLOGY_NEWTONIAN))
         silt_viscosity_update(s->scene, s->nodes, s->mesh, &f->depth, f->flux, f->inverse, f->w, f->iterations ? 0.5 : 1, f->mu,
                               &f->viscosity);
 }
@@ -189,13 +199,13 @@ static void resist_begin(silt_fluid *f, const silt_step *s) {
 }
 
 // velocity with the pressure of the last iterate, from the right side in f->force
-static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid, silt_error *err) {
+static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid, double drop, silt_error *err) {
     const int D = f->dim;
     if (s->scene->fluid.scheme == SCHEME_IMPLICIT && viscid) {
         memcpy(f->star, f->w, (size_t)D * (size_t)f->n_node * sizeof(double));
         for (int i = 0; i < f->n_node && f->wall_normals.n_row; i++)
             silt_hold_impose(f, i, f->star + D * i); // normals that have changed with the midpoint mesh
-        SILT_TRY(silt_momentum_solve(f, s, f->force, f->star, err));
+        SILT_TRY(silt_momentum_solve(f, s, f->force, drop, f->star, err));
     } else {
         if (viscid)
             silt_assemble_viscous(f, s->mesh, f->w, -1, f->force);
@@ -429,6 +439,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
     const silt_fluid_def *def = &s->scene->fluid;
     const bool consistent = def->pressure == PRESSURE_CONSISTENT;
     const int D = f->dim;
+    const bool direct = D == 2 && consistent && def->scheme == SCHEME_IMPLICIT; // momentum and continuity can be factored as one
     const size_t bytes = (size_t)D * (size_t)f->n_node * sizeof(double);
     double before = HUGE_VAL;
     // a first pressure has nothing to start from
@@ -448,8 +459,8 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             silt_mobile_find(f, s->mesh, p);
             f->seconds_assemble += silt_seconds() - tick;
             tick = silt_seconds();
-            whole = D == 2 && consistent && def->scheme == SCHEME_IMPLICIT && stiffness(f, s) > FLUID_STIFF;
-            SILT_TRY(silt_pressure_factor(f->pressure, f, s, stiffness(f, s) > FLUID_STIFF && !whole, err));
+            whole = direct && mean_stiffness(f, s) > FLUID_STIFF; // a stiff cell here and there is no reason
+            SILT_TRY(silt_pressure_factor(f->pressure, f, s, !direct && stiffness(f, s) > FLUID_STIFF, err));
             f->seconds_solve += silt_seconds() - tick;
             tick = silt_seconds();
             if (f->theta < 0.75 && !s->drag)
@@ -472,7 +483,8 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             find_excess(f, s, f->force);
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
-        SILT_TRY(velocity_star(f, s, stiff > 0, err));
+        // far from the end of the iterations the momentum is not worth more than the pressure
+        SILT_TRY(velocity_star(f, s, stiff > 0, f->iterations && before > 10 * def->tolerance ? 1e-3 : 0, err));
         if (f->shift)
             for (int k = 0; k < D * f->n_node; k++)
                 f->scratch[k] = f->star[k] + f->shift[k];
@@ -517,7 +529,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         tick = silt_seconds();
         if (!whole)
             correct(f, s, f->increment, f->w);
-        if (stiff > FLUID_STIFF && !whole)
+        if (stiff > FLUID_STIFF && !direct)
             SILT_TRY(correct_stiff(f, err));
         for (int i = 0; i < f->n_node; i++)
             p[i] += f->increment[i];
@@ -538,7 +550,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         f->pressure = silt_pressure_create();
     f->theta = def->theta;
     f->seconds_assemble = f->seconds_solve = 0;
-    f->iterations = f->pressure_iterations = 0;
+    f->iterations = f->momentum_iterations = f->pressure_iterations = 0;
     f->projected = 0;
     memset(f->impulse, 0, sizeof f->impulse);
     silt_hold_nodes(f, s);

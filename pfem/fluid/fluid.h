@@ -120,8 +120,10 @@ void silt_assemble_projection(silt_fluid *fluid, const silt_mesh *mesh, const do
 void silt_assemble_divergence(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, const double *p, double *out);
 
 // momentum.c ---------------------------------------------------------------------------------------------
-/** (inertia + K) v = right on the free components; v holds the first guess with held components in place */
-silt_status silt_momentum_solve(silt_fluid *fluid, const silt_step *step, const double *right, double *v, silt_error *err);
+/** (inertia + K) v = right on the free components; v holds the first guess with held components in place.
+ * To six digits more than fluid.tolerance, or to `drop` times the residual of the first guess where that is more. */
+silt_status silt_momentum_solve(silt_fluid *fluid, const silt_step *step, const double *right, double drop, double *v,
+                                silt_error *err);
 
 // debt.c -------------------------------------------------------------------------------------------------
 /** debts spread a little among neighbours, then ask for their volume back: fluid->rate */

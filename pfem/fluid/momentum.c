@@ -3,7 +3,8 @@
 
 #define MOMENTUM_LIMIT 3000
 
-silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const double *right, double *v, silt_error *err) {
+silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const double *right, double drop, double *v,
+                                silt_error *err) {
     const int D = f->dim, n = f->n_node;
     const silt_mesh *mesh = step->mesh;
     double *r = f->cg[0], *s = f->cg[1], *as = f->cg[2], *diagonal = f->increment;
@@ -30,8 +31,9 @@ silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const doub
         }
     }
     // what walls hold is no measure of what is solved for, only of its rounding
-    const double target = silt_max(1e-24 * scale, 1e-30 * whole);
-    f->momentum_iterations = 0;
+    const double share = silt_clamp(1e-6 * step->scene->fluid.tolerance, 1e-12, 1e-9);
+    const double target = silt_max(silt_max(silt_square(share) * scale, silt_square(drop) * rz), 1e-30 * whole);
+    int iterations = 0;
     double size = rz; // what is left of the residual
     if (factored && size > target) {
         SILT_TRY(silt_stiff_momentum(f->stiff, f, r, s, err));
@@ -41,7 +43,7 @@ silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const doub
     }
     double *z = factored ? f->scratch : NULL;
     while (size > target) {
-        if (++f->momentum_iterations > MOMENTUM_LIMIT)
+        if (++iterations > MOMENTUM_LIMIT)
             return silt_fail(err, SILT_FAILED, "the momentum system did not converge in %d iterations (%d nodes)", MOMENTUM_LIMIT, n);
         for (int i = 0; i < n; i++)
             for (int d = 0; d < D; d++)
@@ -77,5 +79,6 @@ silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const doub
         if (!isfinite(rz))
             return silt_fail(err, SILT_FAILED, "the momentum system gave numbers that are not finite");
     }
+    f->momentum_iterations += iterations;
     return SILT_OK;
 }
