@@ -549,7 +549,10 @@ silt_status silt_dem_wait(silt_dem *dem, silt_error *err) {
         return silt_fail(err, SILT_FAILED, "%s", dem->link.why.text);
     if (!dem->link.busy)
         return SILT_OK;
+    // what was waited for are the substeps first, then what LIGGGHTS does around them
+    const double since = silt_seconds();
     SILT_TRY(dem_link_collect(&dem->link, err));
+    silt_clock_book(CLOCK_grains, silt_min(silt_seconds() - since, dem->link.shared->seconds));
     return dem_take(dem, err);
 }
 

@@ -59,6 +59,7 @@ typedef struct dem_shared {
     int n_step;
     // answer
     int n_grain;
+    double seconds; // that the substeps took, without what stands before and after them
     char text[1024]; // why the worker gave up, or empty
     // sections, bytes from the start
     uint64_t wall;        // 4 double per wall

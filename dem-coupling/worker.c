@@ -17,6 +17,7 @@
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #define LIGGGHTS_SCREEN 16 // pointers into the LAMMPS object
@@ -140,6 +141,12 @@ static void *worker_grow(void *data, size_t count, size_t size) {
     if (!grown)
         worker_fail("out of memory");
     return grown;
+}
+
+static double worker_seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
 // maps the shared memory, again when the client made it larger
@@ -434,14 +441,18 @@ static void worker_advance(int n_step) {
         memcpy(a.omega[i], row + 3, 3 * sizeof *row);
     }
     free(keep);
-    if (n_step > 0)
+    if (n_step > 0) {
+        const double since = worker_seconds();
         script_run(worker.lmp, n_step);
+        worker.shared->seconds = worker_seconds() - since;
+    }
 }
 
 static void worker_run(void) {
     dem_shared *s = worker.shared;
     const int *gone = DEM_SECTION(s, const int, remove);
 
+    s->seconds = 0;
     if (s->n_remove) {
         worker_atoms a = worker_look();
         worker_index(&a);

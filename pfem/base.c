@@ -74,6 +74,50 @@ double silt_seconds(void) {
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
+static _Thread_local struct {
+    double seconds[CLOCK_COUNT], since;
+    silt_clock now;
+    bool cpu;
+} clocks = {.now = CLOCK_rest};
+
+double silt_clock_now(void) {
+    if (!clocks.cpu)
+        return silt_seconds();
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+void silt_clock_cpu(bool cpu) {
+    clocks.cpu = cpu;
+    silt_clock_reset();
+}
+
+silt_clock silt_clock_to(silt_clock clock) {
+    const double now = silt_clock_now();
+    const silt_clock before = clocks.now;
+    clocks.seconds[before] += now - clocks.since;
+    clocks.since = now;
+    clocks.now = clock;
+    return before;
+}
+
+void silt_clock_reset(void) {
+    clocks.now = CLOCK_rest;
+    clocks.since = silt_clock_now();
+    memset(clocks.seconds, 0, sizeof clocks.seconds);
+}
+
+void silt_clock_book(silt_clock clock, double seconds) {
+    clocks.seconds[clock] += seconds;
+    clocks.seconds[clocks.now] -= seconds;
+}
+
+void silt_clock_read(double seconds[CLOCK_COUNT]) {
+    silt_clock_to(clocks.now);
+    memcpy(seconds, clocks.seconds, sizeof clocks.seconds);
+}
+
 uint64_t silt_hash(uint64_t seed, const void *data, size_t size) {
     // FNV-1a, 64 bits
     uint64_t hash = seed ? seed : 0xcbf29ce484222325u;

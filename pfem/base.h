@@ -33,6 +33,31 @@ char *silt_text(const char *format, ...) __attribute__((format(printf, 1, 2))); 
 #define SILT_RESERVE(p, capacity, need) ((p) = silt_grow((p), &(capacity), (need), sizeof *(p)))
 
 double silt_seconds(void);                                       /**< monotonic wall clock, s */
+
+/** What a step's time goes to. One clock runs at any time, so that they add up to the step; each thread has its own. */
+#define SILT_CLOCKS(X)                                                                                                 \
+    X(triangulate) X(decide) X(heal) X(book) X(index) X(refine) X(handover) X(assemble) X(momentum) X(matrix) \
+        X(analyse) X(factor) X(apply) X(solve) X(bed) X(coupling) X(grains) X(move) X(output) X(rest)
+typedef enum silt_clock {
+#define X(name) CLOCK_##name,
+    SILT_CLOCKS(X)
+#undef X
+        CLOCK_COUNT
+} silt_clock;
+void silt_clock_cpu(bool cpu);                /**< this thread's clocks tick on the wall, or in the process' own CPU time */
+double silt_clock_now(void);                  /**< s, of that */
+void silt_clock_reset(void);                  /**< all at 0, `rest` runs */
+silt_clock silt_clock_to(silt_clock clock);   /**< from now on this one runs; @return the one that ran */
+void silt_clock_book(silt_clock clock, double seconds); /**< s of the clock that runs are this one's */
+void silt_clock_read(double seconds[CLOCK_COUNT]);
+/** runs what follows on a clock, then goes back to the one that ran */
+#define SILT_CLOCKED(name, ...)                                                                                        \
+    do {                                                                                                               \
+        const silt_clock clock_ = silt_clock_to(CLOCK_##name);                                                         \
+        __VA_ARGS__;                                                                                                   \
+        silt_clock_to(clock_);                                                                                         \
+    } while (0)
+
 uint64_t silt_hash(uint64_t seed, const void *data, size_t size); /**< FNV-1a, seed 0 starts */
 uint64_t silt_random(uint64_t *state);                           /**< splitmix64 */
 double silt_uniform(uint64_t *state);                            /**< in [0, 1) */

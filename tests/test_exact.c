@@ -62,7 +62,7 @@ static void bench_until(bench *b, double time) {
 }
 
 static void bench_end(bench *b) {
-    run_free(&b->run);
+    silt_run_free(&b->run);
     silt_scene_free(&b->scene);
     DIR *list = opendir(b->folder);
     for (struct dirent *entry; list && (entry = readdir(list));)

@@ -67,7 +67,7 @@ static void sweep(const char *path) {
 }
 
 static void end(silt_run *run, silt_scene **scene) {
-    run_free(run);
+    silt_run_free(run);
     silt_scene_free(scene);
     char *out = silt_text("%s/out", folder);
     sweep(out);

@@ -205,7 +205,9 @@ static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid,
         memcpy(f->star, f->w, (size_t)D * (size_t)f->n_node * sizeof(double));
         for (int i = 0; i < f->n_node && f->wall_normals.n_row; i++)
             silt_hold_impose(f, i, f->star + D * i); // normals that have changed with the midpoint mesh
-        SILT_TRY(silt_momentum_solve(f, s, f->force, drop, f->star, err));
+        silt_status status;
+        SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, drop, f->star, err));
+        SILT_TRY(status);
     } else {
         if (viscid)
             silt_assemble_viscous(f, s->mesh, f->w, -1, f->force);
@@ -258,12 +260,11 @@ static void correct(silt_fluid *f, const silt_step *s, const double *q, double *
 
 // increment = -matrix^-1 residual
 static silt_status pressure_increment(silt_fluid *f, const silt_step *s, double tolerance, silt_error *err) {
-    const double tick = silt_seconds();
+    silt_status status;
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
-    SILT_TRY(silt_pressure_solve(f->pressure, f, s, f->residual, tolerance, f->increment, err));
-    f->seconds_solve += silt_seconds() - tick;
-    return SILT_OK;
+    SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, s, f->residual, tolerance, f->increment, err));
+    return status;
 }
 
 static double kinetic_energy(const silt_fluid *f, const silt_step *s, const double *v) {
@@ -381,23 +382,24 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
 // stiff viscosity: the pressure's operator is nearly the mass matrix over the viscosity, its inverse adds to that of S + L
 // (Cahouet and Chabard, Int. J. Numer. Meth. Fluids 8, 1988)
 static silt_status correct_stiff(silt_fluid *f, silt_error *err) {
-    const double tick = silt_seconds();
-    SILT_TRY(silt_pressure_solve_stiff(f->pressure, f->residual, f->scratch, err));
+    silt_status status;
+    SILT_CLOCKED(solve, status = silt_pressure_solve_stiff(f->pressure, f->residual, f->scratch, err));
     for (int i = 0; i < f->n_node; i++)
         f->increment[i] += f->scratch[i];
-    f->seconds_solve += silt_seconds() - tick;
-    return SILT_OK;
+    return status;
 }
 
-// a node that came within the courant number and leaves by more than a cell: the step was too long for what happened in it
+// A node that came within the courant number and leaves by more than a cell: the step was too long for what happened in it. Where
+// no smaller step will follow, over ten cells: no result after that is worth having.
 static silt_status astray_node(const silt_fluid *f, const silt_step *s, silt_error *err) {
     const int D = f->dim;
-    for (int i = 0; i < f->n_node && !f->last_try; i++) {
-        const double h = silt_node_h(s->nodes, i, s->scene->fluid.size);
-        if (!s->mesh->wet[i] || silt_length(D, f->w + D * i) * s->dt < 1.5 * h || silt_length(D, s->nodes->v + D * i) * s->dt > h)
+    const double most = f->last_try ? 10 : 1.5;
+    for (int i = 0; i < f->n_node; i++) {
+        const double h = silt_node_h(s->nodes, i, s->scene->fluid.size), way = silt_length(D, f->w + D * i) * s->dt;
+        if (!s->mesh->wet[i] || way < most * h || (!f->last_try && silt_length(D, s->nodes->v + D * i) * s->dt > h))
             continue;
-        return silt_fail(err, SILT_FAILED, "a node at (%g, %g) would be thrown over %.1f cells in a step", s->nodes->x[D * i],
-                         s->nodes->x[D * i + 1], silt_length(D, f->w + D * i) * s->dt / h);
+        return silt_fail(err, SILT_FAILED, "a node at (%g, %g) would be thrown over %.3g cells in a step", s->nodes->x[D * i],
+                         s->nodes->x[D * i + 1], way / h);
     }
     return SILT_OK;
 }
@@ -417,22 +419,20 @@ static bool choose_theta(silt_fluid *f, const silt_step *s) {
 
 // the momentum, or momentum and continuity as one system; once a step unless viscosity changes
 static silt_status factor_stiff(silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
-    const double tick = silt_seconds();
+    silt_status status;
     if (silt_stiff_ready(f->stiff, pressure) && !silt_viscosity_varies(s->scene))
         return SILT_OK;
-    SILT_TRY(silt_stiff_factor(&f->stiff, f, s, pressure, err));
-    f->seconds_solve += silt_seconds() - tick;
-    return SILT_OK;
+    SILT_CLOCKED(factor, status = silt_stiff_factor(&f->stiff, f, s, pressure, err));
+    return status;
 }
 
 static silt_status correct_whole(silt_fluid *f, const silt_step *s, silt_error *err) {
+    silt_status status;
     SILT_TRY(factor_stiff(f, s, true, err));
-    const double tick = silt_seconds();
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
-    SILT_TRY(silt_stiff_correct(f->stiff, f, f->residual, f->increment, f->w, err));
-    f->seconds_solve += silt_seconds() - tick;
-    return SILT_OK;
+    SILT_CLOCKED(solve, status = silt_stiff_correct(f->stiff, f, f->residual, f->increment, f->w, err));
+    return status;
 }
 
 static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, silt_error *err) {
@@ -449,20 +449,18 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         first = p[i] == 0;
     const int most = def->iterations * (first ? 10 : 1);
     for (f->iterations = 0;; f->iterations++) {
-        double tick = silt_seconds();
+        silt_status status;
         if (s->drag && s->drag->update)
-            s->drag->update(s->drag->self, f->w, p, s->dt);
+            SILT_CLOCKED(coupling, s->drag->update(s->drag->self, f->w, p, s->dt));
         resist(f, s);
         if (f->iterations == 0) {
             if (choose_theta(f, s))
                 silt_assemble_geometry(f, s, s->dt);
             silt_mobile_find(f, s->mesh, p);
-            f->seconds_assemble += silt_seconds() - tick;
-            tick = silt_seconds();
             whole = direct && mean_stiffness(f, s) > FLUID_STIFF; // a stiff cell here and there is no reason
-            SILT_TRY(silt_pressure_factor(f->pressure, f, s, !direct && stiffness(f, s) > FLUID_STIFF, err));
-            f->seconds_solve += silt_seconds() - tick;
-            tick = silt_seconds();
+            SILT_CLOCKED(matrix,
+                         status = silt_pressure_factor(f->pressure, f, s, !direct && stiffness(f, s) > FLUID_STIFF, err));
+            SILT_TRY(status);
             if (f->theta < 0.75 && !s->drag)
                 SILT_TRY(project_start(f, s, p, err));
             if (f->shift) {
@@ -489,7 +487,6 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             for (int k = 0; k < D * f->n_node; k++)
                 f->scratch[k] = f->star[k] + f->shift[k];
         silt_assemble_continuity(f, s->mesh, s->drag, f->rate, f->shift ? f->scratch : f->star, p);
-        f->seconds_assemble += silt_seconds() - tick;
 
         const int worst_node = worst_residual(f, s);
         const double *place = s->nodes->x + D * worst_node;
@@ -526,7 +523,6 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             SILT_TRY(correct_whole(f, s, err));
         else
             SILT_TRY(pressure_increment(f, s, 0.01, err));
-        tick = silt_seconds();
         if (!whole)
             correct(f, s, f->increment, f->w);
         if (stiff > FLUID_STIFF && !direct)
@@ -537,7 +533,6 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             silt_mix_next(f->mix, D, f->n_node, f->increment, f->residual, p, f->w);
         if (refresh)
             silt_assemble_projection(f, s->mesh, p);
-        f->seconds_assemble += silt_seconds() - tick;
     }
 }
 
@@ -549,7 +544,6 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     if (!f->pressure)
         f->pressure = silt_pressure_create();
     f->theta = def->theta;
-    f->seconds_assemble = f->seconds_solve = 0;
     f->iterations = f->momentum_iterations = f->pressure_iterations = 0;
     f->projected = 0;
     memset(f->impulse, 0, sizeof f->impulse);

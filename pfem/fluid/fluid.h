@@ -13,6 +13,9 @@ typedef struct silt_pressure silt_pressure; // the pressure matrix and its facto
 typedef struct silt_stiff silt_stiff;       // factors of momentum and continuity where viscosity is stiff, stiff.c
 typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
 
+/** cholmod_factorize on one thread: CHOLMOD 3 asks OpenMP for four, however many there are, to fill in small maps */
+int silt_factorize(void *matrix, void *factor, void *common);
+
 /** what a step sees */
 typedef struct silt_step {
     const silt_scene *scene;
@@ -74,7 +77,6 @@ typedef struct silt_fluid {
     double given_back;        // m3, volume that the debts asked for
     double momentum_residual; // N, unbalanced force on free nodes
     double momentum_scale;    // N, what it is relative to
-    double seconds_assemble, seconds_solve;
 } silt_fluid;
 
 void silt_fluid_clear(silt_fluid *fluid);

@@ -1,6 +1,8 @@
 // what surroundings hold: tank walls, bed, bodies, inlets; and the friction that they exert where water slides
 #include "fluid.h"
 
+#define BED_FLUSH 0.866 // cosine of the largest turn, 30 degrees, between bed and a wall that goes on from it
+
 void silt_hold_project(const silt_fluid *f, int i, double *v) {
     const int D = f->dim;
     if (f->hold[i] == HOLD_FREE)
@@ -57,22 +59,51 @@ void silt_hold_bent(silt_fluid *f, const silt_step *s) {
     }
 }
 
+// normal of a facet into the water, as long as the facet
+static void facet_normal(const double *x, const int *facet, double n[2]) {
+    n[0] = -(x[2 * facet[1] + 1] - x[2 * facet[0] + 1]);
+    n[1] = x[2 * facet[1]] - x[2 * facet[0]];
+}
+
+// Slip on the bed ends where it meets something else that is shut: in a corner with a wall, where a node that slid on would go
+// through that wall; and at the mouth of a slit between bed and body, whose nodes cannot follow a surface: what a sliding one
+// leaves behind is new water in every step, driven on by its own pressure. A wall that goes on from the bed has its share of the normal.
+static void hold_bed_ends(silt_fluid *f, const silt_step *s) {
+    const silt_mesh *mesh = s->mesh;
+    const uint8_t *kind = s->nodes->kind;
+    for (int k = 0; k < mesh->n_facet; k++)
+        for (int c = 0; c < 2; c++) {
+            const int i = mesh->facet[k][c], other = mesh->facet[k][1 - c];
+            if (kind[i] != NODE_BED || f->hold[i] != HOLD_NORMAL)
+                continue;
+            const bool slit = mesh->facet_kind[k] == FACET_FREE && kind[other] == NODE_BODY;
+            double n[2], *bed = f->normal + 2 * i;
+            facet_normal(s->nodes->x, mesh->facet[k], n);
+            const double turn = (n[0] * bed[0] + n[1] * bed[1]) / (silt_length(2, n) * silt_length(2, bed));
+            if (slit || (mesh->facet_kind[k] == FACET_WALL && !(turn > BED_FLUSH)))
+                f->hold[i] = HOLD_ALL;
+            else if (mesh->facet_kind[k] == FACET_WALL)
+                for (int d = 0; d < 2; d++)
+                    bed[d] += n[d];
+        }
+}
+
 // slip on the bed: the normal of its facets around the node
 static void hold_bed(silt_fluid *f, const silt_step *s) {
     const silt_mesh *mesh = s->mesh;
-    const double *x = s->nodes->x;
     for (int k = 0; k < mesh->n_facet; k++) {
         if (mesh->facet_kind[k] != FACET_BED)
             continue;
-        const int a = mesh->facet[k][0], b = mesh->facet[k][1];
-        const double dx = x[2 * b] - x[2 * a], dy = x[2 * b + 1] - x[2 * a + 1];
+        double n[2];
+        facet_normal(s->nodes->x, mesh->facet[k], n);
         for (int c = 0; c < 2; c++) {
             const int i = mesh->facet[k][c];
-            f->normal[2 * i] -= dy;
-            f->normal[2 * i + 1] += dx;
+            for (int d = 0; d < 2; d++)
+                f->normal[2 * i + d] += n[d];
             f->hold[i] = HOLD_NORMAL;
         }
     }
+    hold_bed_ends(f, s);
     for (int i = 0; i < f->n_node; i++)
         if (s->nodes->kind[i] == NODE_BED && f->hold[i] == HOLD_NORMAL) {
             const double length = hypot(f->normal[2 * i], f->normal[2 * i + 1]);

@@ -2,6 +2,7 @@
 // the same operator, applied cell by cell, preconditioned by the factor of a compact Laplacian that resembles it
 #include <cholmod.h>
 #include <dlfcn.h>
+#include <omp.h>
 
 #include "fluid.h"
 
@@ -240,13 +241,24 @@ static void boundary_diagonal(silt_pressure *p, silt_fluid *f, const silt_mesh *
     }
 }
 
+int silt_factorize(void *matrix, void *factor, void *common) {
+    const int levels = omp_get_max_active_levels();
+    omp_set_max_active_levels(0);
+    const int done = cholmod_factorize(matrix, factor, common);
+    omp_set_max_active_levels(levels);
+    return done;
+}
+
 static silt_status system_factor(silt_pressure *p, silt_system *system, const silt_fluid *f, const silt_step *s, bool fresh, silt_error *err) {
     if (fresh) {
         cholmod_free_factor(&system->factor, &p->common);
-        system->factor = cholmod_analyze(system->matrix, &p->common);
+        SILT_CLOCKED(analyse, system->factor = cholmod_analyze(system->matrix, &p->common));
     }
     cholmod_factor *factor = system->factor;
-    if (!factor || !cholmod_factorize(system->matrix, factor, &p->common) || p->common.status == CHOLMOD_NOT_POSDEF) {
+    int done = 0;
+    if (factor)
+        SILT_CLOCKED(factor, done = silt_factorize(system->matrix, factor, &p->common));
+    if (!done || p->common.status == CHOLMOD_NOT_POSDEF) {
         const int bad = factor ? (int)factor->minor : 0;
         const int node = factor && factor->Perm && bad < p->n ? ((int *)factor->Perm)[bad] : 0;
         const double *x = s->nodes->x + f->dim * node;
@@ -386,7 +398,7 @@ silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step
     for (int k = 0; rz > target && rz > 0; k++) {
         if (k == CG_LIMIT)
             return silt_fail(err, SILT_FAILED, "the pressure system did not converge in %d iterations (%d nodes)", CG_LIMIT, n);
-        operator_apply(p, f, s->mesh, d, ad);
+        SILT_CLOCKED(apply, operator_apply(p, f, s->mesh, d, ad));
         const double curvature = dot(n, d, ad);
         if (!(curvature > 0))
             return silt_fail(err, SILT_FAILED, "the pressure operator is not positive definite (%d nodes)", n);

@@ -243,7 +243,7 @@ silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const sil
     assemble(q, f, mesh);
     hold(q, f, mesh);
     fill(q, b, mesh);
-    if (!b->factor || !cholmod_factorize(b->matrix, b->factor, &q->common) || q->common.status == CHOLMOD_NOT_POSDEF) {
+    if (!b->factor || !silt_factorize(b->matrix, b->factor, &q->common) || q->common.status == CHOLMOD_NOT_POSDEF) {
         q->revision = -1;
         return silt_fail(err, SILT_FAILED, "the %s matrix of the stiff water could not be factored",
                          pressure ? "saddle-point" : "momentum");

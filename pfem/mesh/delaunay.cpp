@@ -6,6 +6,7 @@
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
 #include <CGAL/Triangulation_vertex_base_with_info_3.h>
 #include <cstdlib>
+#include <ctime>
 #include <new>
 #include <utility>
 #include <vector>
@@ -19,16 +20,43 @@ using Vertex3 = CGAL::Triangulation_vertex_base_with_info_3<int, Kernel>;
 using Cell3 = CGAL::Delaunay_triangulation_cell_base_3<Kernel>;
 using Structure3 = CGAL::Triangulation_data_structure_3<Vertex3, Cell3>;
 using Delaunay3 = CGAL::Delaunay_triangulation_3<Kernel, Structure3>;
+
+template <class Mesh, class Cloud> double seconds_of(const Cloud &cloud) {
+    const std::clock_t since = std::clock();
+    Mesh mesh(cloud.begin(), cloud.end());
+    return static_cast<double>(std::clock() - since) / CLOCKS_PER_SEC;
+}
+
+std::vector<std::pair<Kernel::Point_2, int>> cloud_2d(int n, const double *x) {
+    std::vector<std::pair<Kernel::Point_2, int>> cloud;
+    cloud.reserve(static_cast<size_t>(n));
+    for (int i = 0; i < n; i++)
+        cloud.emplace_back(Kernel::Point_2(x[2 * i], x[2 * i + 1]), i);
+    return cloud;
+}
+
+std::vector<std::pair<Kernel::Point_3, int>> cloud_3d(int n, const double *x) {
+    std::vector<std::pair<Kernel::Point_3, int>> cloud;
+    cloud.reserve(static_cast<size_t>(n));
+    for (int i = 0; i < n; i++)
+        cloud.emplace_back(Kernel::Point_3(x[3 * i], x[3 * i + 1], x[3 * i + 2]), i);
+    return cloud;
+}
 } // namespace
+
+double silt_delaunay_seconds(int dim, int n, const double *x) {
+    try {
+        return dim == 3 ? seconds_of<Delaunay3>(cloud_3d(n, x)) : seconds_of<Delaunay>(cloud_2d(n, x));
+    } catch (const std::bad_alloc &) {
+        return -1;
+    }
+}
 
 int silt_delaunay_2d(int n, const double *x, int **triangle, int *n_triangle) {
     *triangle = nullptr;
     *n_triangle = 0;
     try {
-        std::vector<std::pair<Kernel::Point_2, int>> cloud;
-        cloud.reserve(static_cast<size_t>(n));
-        for (int i = 0; i < n; i++)
-            cloud.emplace_back(Kernel::Point_2(x[2 * i], x[2 * i + 1]), i);
+        const auto cloud = cloud_2d(n, x);
         Delaunay mesh(cloud.begin(), cloud.end());
         const size_t count = mesh.dimension() == 2 ? mesh.number_of_faces() : 0;
         int *out = static_cast<int *>(std::malloc((count ? count : 1) * 3 * sizeof(int)));
@@ -50,10 +78,7 @@ int silt_delaunay_3d(int n, const double *x, int **tetrahedron, int *n_tetrahedr
     *tetrahedron = nullptr;
     *n_tetrahedron = 0;
     try {
-        std::vector<std::pair<Kernel::Point_3, int>> cloud;
-        cloud.reserve(static_cast<size_t>(n));
-        for (int i = 0; i < n; i++)
-            cloud.emplace_back(Kernel::Point_3(x[3 * i], x[3 * i + 1], x[3 * i + 2]), i);
+        const auto cloud = cloud_3d(n, x);
         // points are put in along a space-filling curve; ties are broken by the order of the coordinates, not of
         // insertion
         Delaunay3 mesh(cloud.begin(), cloud.end());

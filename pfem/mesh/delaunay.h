@@ -19,6 +19,10 @@ int silt_delaunay_2d(int n, const double *x, int **triangle, int *n_triangle);
  * from which they are seen counter-clockwise). Slivers are left in: four nodes nearly in a plane have a small sphere. */
 int silt_delaunay_3d(int n, const double *x, int **tetrahedron, int *n_tetrahedron);
 
+/** What CGAL alone needs for the triangulation of these points from scratch, s of CPU, -1 when memory is exhausted: the unit that costs
+ * of a step are told in (silt bench). @param dim  2 or 3 */
+double silt_delaunay_seconds(int dim, int n, const double *x);
+
 #ifdef __cplusplus
 }
 #endif

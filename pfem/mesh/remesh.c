@@ -323,7 +323,8 @@ static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, c
             x[dim * m++] = at + side * parts;
         }
     int *found = NULL, n_found = 0, kept = 0;
-    const int failed = (dim == 3 ? silt_delaunay_3d : silt_delaunay_2d)(m, x, &found, &n_found);
+    int failed;
+    SILT_CLOCKED(triangulate, failed = (dim == 3 ? silt_delaunay_3d : silt_delaunay_2d)(m, x, &found, &n_found));
     *cells = NULL;
     if (!failed)
         *cells = silt_alloc((size_t)n_found + 1, sizeof **cells);
@@ -447,8 +448,9 @@ static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, c
     silt_cells_across(mesh->dim, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
     if (mesh->dim != 3)
         return 0;
-    peel_slivers(draft, nodes, sliver);
-    return silt_mesh_heal(draft, nodes, x, size);
+    int flat;
+    SILT_CLOCKED(heal, peel_slivers(draft, nodes, sliver); flat = silt_mesh_heal(draft, nodes, x, size));
+    return flat;
 }
 
 // ---- the first mesh
@@ -626,7 +628,8 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
         }
         free(sliver);
         sliver = NULL;
-        const double largest = choose_cells(&draft, nodes, scene, barrier, memory, &old, cells, n_cells, &sliver);
+        double largest;
+        SILT_CLOCKED(decide, largest = choose_cells(&draft, nodes, scene, barrier, memory, &old, cells, n_cells, &sliver));
         free(cells);
         if (period <= 0 || 2 * largest <= margin || margin >= period)
             break;
@@ -637,7 +640,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
     for (int e = 0; e < memory->n_cell; e++)
         for (int a = 0; a <= dim; a++)
             was_wet[memory->cell[e][a]] = 1;
-    silt_book_volume(&draft, nodes, memory, &old, was_wet, scene->fluid.size);
+    SILT_CLOCKED(book, silt_book_volume(&draft, nodes, memory, &old, was_wet, scene->fluid.size));
     free(was_wet);
     silt_cell_set_clear(&old);
     free(sliver);

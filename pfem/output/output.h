@@ -104,6 +104,9 @@ typedef struct silt_summary {
     int64_t steps, retries, iterations, most_iterations;
 } silt_summary;
 silt_status silt_summary_write(const char *out, const silt_view *view, const silt_summary *summary, silt_error *err);
+/** a text in quotes or null; a name with its number (NaN and infinity: null) and what follows it */
+void silt_json_text(FILE *to, const char *text);
+void silt_json_number(FILE *to, const char *name, double value, const char *end);
 void silt_progress(const silt_view *view, double until, double seconds, bool last); // one terminal line on stderr
 
 // verify.c, draw.c, info.c ---------------------------------------------------------------------------

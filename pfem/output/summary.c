@@ -14,7 +14,7 @@ static const char *const summary_phase[PHASE_COUNT] = {
 
 // ---------------------------------------------------------------- JSON
 
-static void json_text(FILE *to, const char *text) {
+void silt_json_text(FILE *to, const char *text) {
     if (!text) {
         fputs("null", to);
         return;
@@ -34,7 +34,7 @@ static void json_text(FILE *to, const char *text) {
 }
 
 // JSON knows no NaN and no infinity
-static void json_number(FILE *to, const char *name, double value, const char *end) {
+void silt_json_number(FILE *to, const char *name, double value, const char *end) {
     if (isfinite(value))
         fprintf(to, "\"%s\": %.9g%s", name, value, end);
     else
@@ -45,14 +45,14 @@ static void summary_checks(FILE *to, const silt_scene *scene, const silt_check_r
     fputs("  \"checks\": [", to);
     for (int i = 0; i < scene->n_check; i++) {
         fprintf(to, "%s\n    {\"name\": ", i ? "," : "");
-        json_text(to, check[i].name);
+        silt_json_text(to, check[i].name);
         fputs(", ", to);
-        json_number(to, "value", check[i].value, ", ");
-        json_number(to, "reference", check[i].reference, ", ");
-        json_number(to, "error", check[i].error, ", ");
-        json_number(to, "tolerance", check[i].tolerance, ", ");
+        silt_json_number(to, "value", check[i].value, ", ");
+        silt_json_number(to, "reference", check[i].reference, ", ");
+        silt_json_number(to, "error", check[i].error, ", ");
+        silt_json_number(to, "tolerance", check[i].tolerance, ", ");
         fprintf(to, "\"pass\": %s, \"note\": ", check[i].pass ? "true" : "false");
-        json_text(to, check[i].note);
+        silt_json_text(to, check[i].note);
         fputc('}', to);
     }
     fputs(scene->n_check ? "\n  ]\n" : "]\n", to);
@@ -66,16 +66,16 @@ static void summary_print(FILE *to, const silt_view *view, const silt_summary *s
     double per_node = summary->node_steps > 0 ? 1e6 / summary->node_steps : 0;
 
     fputs("{\n  \"version\": ", to);
-    json_text(to, SILT_VERSION);
+    silt_json_text(to, SILT_VERSION);
     fputs(",\n  \"title\": ", to);
-    json_text(to, scene->title);
+    silt_json_text(to, scene->title);
     fprintf(to, ",\n  \"scene_hash\": \"%016llx\",\n  \"status\": ", (unsigned long long)scene->hash);
-    json_text(to, summary->status);
+    silt_json_text(to, summary->status);
     fputs(",\n  \"message\": ", to);
-    json_text(to, summary->message ? summary->message : "");
+    silt_json_text(to, summary->message ? summary->message : "");
     fprintf(to, ",\n  \"steps\": %lld,\n  ", (long long)view->step);
-    json_number(to, "time", view->time, ",\n  ");
-    json_number(to, "time_end", scene->time.end, ",\n  ");
+    silt_json_number(to, "time", view->time, ",\n  ");
+    silt_json_number(to, "time_end", scene->time.end, ",\n  ");
     fprintf(to, "\"nodes\": %d,\n  ", view->nodes ? view->nodes->count : 0);
     fprintf(to, "\"grains\": %d,\n  ", view->grains ? view->grains->count : 0);
 
@@ -84,19 +84,19 @@ static void summary_print(FILE *to, const silt_view *view, const silt_summary *s
     fprintf(to, "\"retries\": %lld,\n  ", (long long)summary->retries);
     fprintf(to, "\"iterations\": %lld,\n  ", (long long)summary->iterations);
     fprintf(to, "\"most_iterations\": %lld,\n  ", (long long)summary->most_iterations);
-    json_number(to, "seconds", summary->seconds, ",\n  ");
-    json_number(to, "node_steps", summary->node_steps, ",\n  ");
-    json_number(to, "microseconds_per_node_step", summary->seconds * per_node, ",\n  ");
+    silt_json_number(to, "seconds", summary->seconds, ",\n  ");
+    silt_json_number(to, "node_steps", summary->node_steps, ",\n  ");
+    silt_json_number(to, "microseconds_per_node_step", summary->seconds * per_node, ",\n  ");
     fputs("\"phases\": {", to);
     for (int i = 0; i < PHASE_COUNT; i++) {
         fprintf(to, "%s\n    \"%s\": {", i ? "," : "", summary_phase[i]);
-        json_number(to, "seconds", summary->phase[i], ", ");
-        json_number(to, "microseconds_per_node_step", summary->phase[i] * per_node, "}");
+        silt_json_number(to, "seconds", summary->phase[i], ", ");
+        silt_json_number(to, "microseconds_per_node_step", summary->phase[i] * per_node, "}");
     }
     fprintf(to, "\n  },\n  \"peak_memory_bytes\": %lld,\n  ", 1024LL * usage.ru_maxrss);
-    json_number(to, "worst_volume_error", summary->worst_volume_error, ",\n  ");
-    json_number(to, "worst_sediment_error", summary->worst_sediment_error, ",\n  ");
-    json_number(to, "worst_momentum_error", summary->worst_momentum_error, ",\n");
+    silt_json_number(to, "worst_volume_error", summary->worst_volume_error, ",\n  ");
+    silt_json_number(to, "worst_sediment_error", summary->worst_sediment_error, ",\n  ");
+    silt_json_number(to, "worst_momentum_error", summary->worst_momentum_error, ",\n");
     summary_checks(to, scene, check);
     fputs("}\n", to);
 }

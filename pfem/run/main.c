@@ -1,6 +1,6 @@
 // the command line: silt COMMAND ...; prints what the library reports and turns its status into the exit code
 
-#include "output.h"
+#include "bench.h"
 
 #include <argp.h>
 #include <errno.h>
@@ -15,6 +15,8 @@ typedef struct main_arguments {
     int n_set, set_capacity;
     const char **set; // owned, -D
     silt_run_def run;
+    int steps, warm_up; // of bench
+    const char *sizes;
     int frame; // -1 all, -2 the last
     const char *field, *slice, *to;
 } main_arguments;
@@ -28,20 +30,24 @@ typedef struct main_command {
 
 // ---------------------------------------------------------------- options
 
-enum { OPTION_UNTIL = 'u', OPTION_THREADS = 't', OPTION_FORCE = 'f', OPTION_FRAME = 'n', OPTION_FIELD = 'c', OPTION_SLICE = 'l' };
+enum { OPTION_UNTIL = 'u', OPTION_THREADS = 't', OPTION_FORCE = 'f', OPTION_FRAME = 'n', OPTION_FIELD = 'c', OPTION_SLICE = 'l',
+       OPTION_SIZES = 's', OPTION_STEPS = 'p', OPTION_WARM_UP = 'm' };
 #define LONG_ONLY(key) ((key) + 256)
 
 static const struct argp_option main_options[] = {
-    {"output", 'o', "OUT", 0, "output folder; default: the scene's folder name plus .out in the current folder", 0},
+    {"output", 'o', "OUT", 0, "output folder; default: the scene's folder name plus .out in the current folder (bench: JSON file; default: none)", 0},
     {NULL, 'D', "KEY=VALUE", 0, "set a key of the scene, for example fluid.size=0.01 or bodies.temple.density=700", 0},
     {"until", LONG_ONLY(OPTION_UNTIL), "T", 0, "run to this time in s instead of the scene's time.end", 0},
-    {"threads", LONG_ONLY(OPTION_THREADS), "N", 0, "threads; default: all", 0},
+    {"threads", LONG_ONLY(OPTION_THREADS), "N", 0, "threads; default: all (bench: one)", 0},
     {"quiet", 'q', NULL, 0, "no progress line", 0},
     {"force", LONG_ONLY(OPTION_FORCE), NULL, 0, "replace an output folder that is there", 0},
     {"worker", LONG_ONLY('w'), "PATH", OPTION_HIDDEN, "the silt-dem program", 0},
     {"frame", LONG_ONLY(OPTION_FRAME), "N|all", 0, "the frame to draw; default: the last", 0},
     {"field", LONG_ONLY(OPTION_FIELD), "NAME", 0, "speed (default), pressure, elevation, vorticity, porosity, mesh or bed", 0},
     {"slice", LONG_ONLY(OPTION_SLICE), "PLANE", 0, "a cut through three dimensions, for example y=0.5", 0},
+    {"sizes", LONG_ONLY(OPTION_SIZES), "LIST", 0, "nodes, for example 10k,40k; of a collapse N, for example 20,40", 0},
+    {"steps", LONG_ONLY(OPTION_STEPS), "N", 0, "steps that are measured; default: 9", 0},
+    {"warm-up", LONG_ONLY(OPTION_WARM_UP), "N", 0, "steps before those; default: 6", 0},
     {"to", LONG_ONLY('d'), "FOLDER", 0, "where the pictures go; default: OUT", 0},
 };
 enum { N_OPTION = sizeof main_options / sizeof main_options[0] };
@@ -94,6 +100,15 @@ static error_t main_option(int key, char *text, struct argp_state *state) {
         return 0;
     case LONG_ONLY(OPTION_SLICE):
         a->slice = text;
+        return 0;
+    case LONG_ONLY(OPTION_SIZES):
+        a->sizes = text;
+        return 0;
+    case LONG_ONLY(OPTION_STEPS):
+        a->steps = (int)main_number(state, "--steps", text, true);
+        return 0;
+    case LONG_ONLY(OPTION_WARM_UP):
+        a->warm_up = (int)main_number(state, "--warm-up", text, true);
         return 0;
     case LONG_ONLY('d'):
         a->to = text;
@@ -166,6 +181,13 @@ static silt_status main_info(const main_arguments *a, silt_error *err) {
     return silt_info(a->path, stdout, err);
 }
 
+static silt_status main_bench(const main_arguments *a, silt_error *err) {
+    const silt_bench_def def = {.scenes = a->path, .sizes = a->sizes, .steps = a->steps, .warm_up = a->warm_up,
+                                .threads = a->run.threads, .n_set = a->n_set, .set = a->set, .json = a->run.out,
+                                .worker = a->run.worker, .quiet = a->run.quiet};
+    return silt_bench(&def, stdout, err);
+}
+
 static silt_status main_help(const main_arguments *a, silt_error *err);
 
 static const main_command main_commands[] = {
@@ -176,8 +198,10 @@ static const main_command main_commands[] = {
     {"verify", "OUT", "Holds the results in OUT against the checks of the scene, a line per check.", "", main_verify},
     {"draw", "OUT", "Draws frames of a run as PNG pictures.", "ncdl", main_draw},
     {"info", "OUT|SCENE", "Tells what a scene asks for, or what stands in an output folder.", "", main_info},
-    {"help", "[KEY]", "Explains the keys of a scene: all of them, a block, or one, for example fluid.size.", "",
-     main_help},
+    {"bench", "[SCENES]", "Measures what steps cost, phase by phase, in scenes of its own or in files (commas between).", "oDtqwspm",
+     main_bench},
+    {"help", "[KEY|COMMAND]", "Explains the keys of a scene: all of them, a block, or one, for example fluid.size; or a command.",
+     "", main_help},
 };
 enum { N_COMMAND = sizeof main_commands / sizeof main_commands[0] };
 
@@ -185,28 +209,52 @@ static void main_usage(FILE *to) {
     fprintf(to, "silt %s: water, bed, grains and rigid objects by particle finite elements and discrete elements\n\n",
             SILT_VERSION);
     for (int i = 0; i < N_COMMAND; i++)
-        fprintf(to, "  silt %-7s %-10s %s\n", main_commands[i].name, main_commands[i].argument,
+        fprintf(to, "  silt %-7s %-13s %s\n", main_commands[i].name, main_commands[i].argument,
                 main_commands[i].document);
     fprintf(to, "\nsilt COMMAND --help lists a command's options, silt --version tells the version.\n"
                 "Exit code: 0 done, 1 the run or a check failed, 2 wrong usage or scene, 3 stopped by a signal with a "
                 "checkpoint written.\n");
 }
 
+// the options that a command takes
+static struct argp main_argp(const main_command *command, struct argp_option option[N_OPTION + 1], char name[32]) {
+    int n = 0;
+    for (int i = 0; i < N_OPTION; i++)
+        if (strchr(command->options, main_options[i].key & 255))
+            option[n++] = main_options[i];
+    snprintf(name, 32, "silt %s", command->name);
+    return (struct argp){option, main_option, command->argument, command->document, NULL, NULL, NULL};
+}
+
+// what `silt COMMAND --help` prints; for bench its scenes too
+static void main_explain(const main_command *command) {
+    struct argp_option option[N_OPTION + 1] = {0};
+    char name[32];
+    struct argp argp = main_argp(command, option, name);
+    argp_help(&argp, stdout, ARGP_HELP_STD_HELP & ~(unsigned)ARGP_HELP_EXIT_OK, name);
+    int n = 0;
+    const bench_scene *list = command->run == main_bench ? bench_scene_list(&n) : NULL;
+    for (int k = 0; k < n; k++)
+        printf("%s  %-12s %s (%s)\n", k ? "" : "\nScenes and their sizes:\n", list[k].name, list[k].document, list[k].sizes);
+    if (n)
+        puts("\ndocs/performance.md explains the table.");
+}
+
 static silt_status main_help(const main_arguments *a, silt_error *err) {
+    for (int i = 0; i < N_COMMAND && a->path; i++)
+        if (strcmp(a->path, main_commands[i].name) == 0) {
+            main_explain(&main_commands[i]);
+            return SILT_OK;
+        }
     return silt_scene_help(a->path, stdout, err);
 }
 
 // reads the command's arguments with the options that it takes; a wrong one ends the program with code 2
 static void main_parse(main_arguments *a, int argc, char **argv) {
     struct argp_option option[N_OPTION + 1] = {0};
-    int n = 0;
-    for (int i = 0; i < N_OPTION; i++)
-        if (strchr(a->command->options, main_options[i].key & 255))
-            option[n++] = main_options[i];
     char name[32];
-    snprintf(name, sizeof name, "silt %s", a->command->name);
+    struct argp argp = main_argp(a->command, option, name);
     argv[0] = name;
-    struct argp argp = {option, main_option, a->command->argument, a->command->document, NULL, NULL, NULL};
     argp_err_exit_status = SILT_INPUT;
     argp_parse(&argp, argc, argv, 0, NULL, a);
 }

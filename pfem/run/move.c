@@ -262,7 +262,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     const double h = scene->fluid.size, rho = scene->fluid.density;
     const int n = nodes->count, D = silt_nodes_dim(nodes);
 
-    const double since = silt_seconds();
+    silt_clock_to(CLOCK_move);
     // material motion; all nodes, so that the old cells hold what continuity gave them
     const double before = silt_mesh_volume(mesh, nodes->x);
     let_go(run);
@@ -313,10 +313,9 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     hand_on_landing(run, run->wall_before, run->v_before);
     let_out(run);
     expel(run);
-    silt_mesh_refine(mesh, nodes, &run->memory, h);
+    SILT_CLOCKED(refine, silt_mesh_refine(mesh, nodes, &run->memory, h));
 
-    const double middle = silt_seconds();
-    run->phase[PHASE_move] += middle - since;
+    silt_clock_to(CLOCK_index);
     SILT_RESERVE(run->map, run->map_capacity, nodes->count + 1);
     SILT_RESERVE(run->v_before, run->v_before_capacity, D * (nodes->count + 1));
     SILT_RESERVE(run->debt_before, run->debt_before_capacity, nodes->count + 1);
@@ -325,7 +324,8 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     run->memory.record = true;
     SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
     double lost[3];
-    silt_momentum_hand_on(&run->memory, mesh, nodes, rho, NULL, run->debt_before, run->v_before, run->map, lost);
+    SILT_CLOCKED(handover,
+                 silt_momentum_hand_on(&run->memory, mesh, nodes, rho, NULL, run->debt_before, run->v_before, run->map, lost));
     run->ledger.volume_reconnected += run->memory.reconnected;
     // without an outlet nothing may leave: what does anyway shows as a volume error
     if (scene->fluid.n_outlet)
@@ -333,9 +333,9 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     for (int k = 0; k < run->bed.n_node; k++)
         if (run->bed.fluid_node[k] >= 0)
             run->bed.fluid_node[k] = run->map[run->bed.fluid_node[k]];
-    silt_size_update(run->size, nodes, mesh);
+    SILT_CLOCKED(refine, silt_size_update(run->size, nodes, mesh));
     SILT_TRY(silt_run_pockets(run, err));
     silt_locator_build(&run->locator, mesh, nodes->x, h);
-    run->phase[PHASE_mesh] += silt_seconds() - middle;
+    silt_clock_to(CLOCK_rest);
     return SILT_OK;
 }

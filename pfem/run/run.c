@@ -15,14 +15,26 @@ static void on_signal(int number) {
         run_stop = 1;
 }
 
-static void phase_add(silt_run *run, silt_phase phase, double since) { run->phase[phase] += silt_seconds() - since; }
+// what history and summary tell of the clocks; `rest` is none of them
+#define PHASE_NONE PHASE_COUNT
+static const silt_phase run_phase[CLOCK_COUNT] = {
+    [CLOCK_triangulate] = PHASE_mesh, [CLOCK_decide] = PHASE_mesh,       [CLOCK_heal] = PHASE_mesh,
+    [CLOCK_book] = PHASE_mesh,        [CLOCK_index] = PHASE_mesh,        [CLOCK_refine] = PHASE_mesh,
+    [CLOCK_handover] = PHASE_mesh,    [CLOCK_assemble] = PHASE_assemble, [CLOCK_momentum] = PHASE_solve,
+    [CLOCK_matrix] = PHASE_solve,     [CLOCK_analyse] = PHASE_solve,     [CLOCK_factor] = PHASE_solve,
+    [CLOCK_apply] = PHASE_solve,      [CLOCK_solve] = PHASE_solve,       [CLOCK_bed] = PHASE_bed,
+    [CLOCK_coupling] = PHASE_dem,     [CLOCK_grains] = PHASE_dem,        [CLOCK_move] = PHASE_move,
+    [CLOCK_output] = PHASE_output,    [CLOCK_rest] = PHASE_NONE,
+};
 
-#define PHASE(name, ...)                                                                                               \
-    do {                                                                                                               \
-        const double since_ = silt_seconds();                                                                          \
-        __VA_ARGS__;                                                                                                   \
-        phase_add(run, PHASE_##name, since_);                                                                          \
-    } while (0)
+static void run_phases(silt_run *run) {
+    double seconds[CLOCK_COUNT];
+    silt_clock_read(seconds);
+    memset(run->phase, 0, sizeof run->phase);
+    for (int c = 0; c < CLOCK_COUNT; c++)
+        if (run_phase[c] != PHASE_NONE)
+            run->phase[run_phase[c]] += seconds[c];
+}
 
 static void run_view(silt_run *run, silt_view *view) {
     const silt_scene *scene = run->scene;
@@ -188,8 +200,46 @@ static void water_restore(silt_run *run) {
     const size_t n = (size_t)run->nodes.count;
     memcpy(run->nodes.v, run->v_old, (size_t)silt_nodes_dim(&run->nodes) * n * sizeof(double));
     memcpy(run->nodes.debt, run->debt_old, n * sizeof(double));
+    memcpy(run->nodes.p, run->p_old, n * sizeof(double));
     silt_pressure_forget(run->fluid.pressure);
     silt_stiff_forget(run->fluid.stiff);
+}
+
+// force and torque of the water on body b: the reaction of its nodes, turned round. @return false: it is dry
+static bool water_on_body(const silt_run *run, int b, double force[2], double *torque) {
+    const struct silt_body *body = &silt_coupling_dem.bodies(run->coupling)->body[b];
+    bool wet = false;
+    force[0] = force[1] = *torque = 0;
+    for (int i = 0; i < run->nodes.count; i++) {
+        if (run->nodes.kind[i] != NODE_BODY || run->nodes.owner[i] != b || !run->mesh.wet[i])
+            continue;
+        const double fx = -run->fluid.reaction[2 * i], fy = -run->fluid.reaction[2 * i + 1];
+        force[0] += fx;
+        force[1] += fy;
+        *torque += (run->nodes.x[2 * i] - body->x[0]) * fy - (run->nodes.x[2 * i + 1] - body->x[1]) * fx;
+        wet = true;
+    }
+    return wet;
+}
+
+// a force that would carry a free body over a cell from rest, or turn it as far, is none: the water's step has failed. LIGGGHTS
+// would lose the body without a word.
+static silt_status loads_sane(const silt_run *run, silt_error *err) {
+    const silt_scene *scene = run->scene;
+    const silt_body_state *bodies = run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
+    for (int b = 0; bodies && b < bodies->count; b++) {
+        const struct silt_body *body = &bodies->body[b];
+        double force[2], torque, reach = 0;
+        if (scene->body[b].motion == MOTION_FIXED || !water_on_body(run, b, force, &torque))
+            continue;
+        for (int k = 0; k < body->n_point; k++)
+            reach = silt_max(reach, hypot(body->outline[2 * k], body->outline[2 * k + 1]));
+        const double way = silt_square(run->dt) * (silt_length(2, force) / body->mass + fabs(torque) * reach / body->inertia);
+        if (!(way < scene->fluid.size))
+            return silt_fail(err, SILT_FAILED, "the water's force (%.3g, %.3g) N and torque %.3g N m would throw body '%s' at (%g, %g) over %.2g cells in a step",
+                             force[0], force[1], torque, scene->body[b].name, body->x[0], body->x[1], way / scene->fluid.size);
+    }
+    return SILT_OK;
 }
 
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
@@ -200,7 +250,7 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         silt_walls_move(&run->walls, scene, run->time + run->dt, run->dt);
         silt_run_prescribe(run);
         if (run->coupling)
-            PHASE(dem, status = silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
+            SILT_CLOCKED(coupling, status = silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
         if (status != SILT_OK) {
             water_restore(run);
             return status;
@@ -209,9 +259,11 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         const silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
                                 .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
                                 .nodes = &run->nodes, .time = run->time, .dt = run->dt};
+        silt_clock_to(CLOCK_assemble);
         status = silt_fluid_step(&run->fluid, &step, err);
-        run->phase[PHASE_assemble] += run->fluid.seconds_assemble;
-        run->phase[PHASE_solve] += run->fluid.seconds_solve;
+        silt_clock_to(CLOCK_rest);
+        if (status == SILT_OK)
+            status = loads_sane(run, err);
         if (status == SILT_OK)
             return SILT_OK;
         water_restore(run);
@@ -235,7 +287,7 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
     }
 }
 
-// What the water does to bodies: the reaction of their nodes, turned round. The water saw the body's last change of speed
+// What the water does to bodies. The water saw the body's last change of speed
 // as its acceleration and answers with its added mass, and with theta below 1 it rings on: the body takes only the share of
 // a new force that leaves this loop stable whatever its contacts do; a steady force comes through whole. before: last
 // step, s
@@ -246,17 +298,8 @@ static void load_bodies(silt_run *run, double before) {
     const double most = silt_max(2 - 1 / theta, 0.1); // half of what the linear loop bears
     for (int b = 0; b < bodies->count; b++) {
         struct silt_body *body = &bodies->body[b];
-        double force[2] = {0, 0}, torque = 0, reach = 0;
-        bool wet = false;
-        for (int i = 0; i < run->nodes.count; i++) {
-            if (run->nodes.kind[i] != NODE_BODY || run->nodes.owner[i] != b || !run->mesh.wet[i])
-                continue;
-            const double fx = -run->fluid.reaction[2 * i], fy = -run->fluid.reaction[2 * i + 1];
-            force[0] += fx;
-            force[1] += fy;
-            torque += (run->nodes.x[2 * i] - body->x[0]) * fy - (run->nodes.x[2 * i + 1] - body->x[1]) * fx;
-            wet = true;
-        }
+        double force[2], torque, reach = 0;
+        const bool wet = water_on_body(run, b, force, &torque);
         for (int k = 0; k < body->n_point; k++)
             reach = silt_max(reach, hypot(body->outline[2 * k], body->outline[2 * k + 1]));
         // added mass and inertia: those of the disc around it
@@ -295,9 +338,27 @@ static silt_status step_sane(const silt_run *run, double wanted, silt_error *err
     return SILT_OK;
 }
 
+// what the discrete elements say, with the step and the speed and load of every body that could be the cause
+static silt_status grains_failed(const silt_run *run, silt_status status, silt_error *err) {
+    if (!err)
+        return status;
+    char why[sizeof err->text];
+    snprintf(why, sizeof why, "%s", err->text);
+    *err = (silt_error){0};
+    silt_fail(err, status, "step %lld at t = %.9g s, dt = %.3g s: %s", (long long)run->step + 1, run->time, run->dt, why);
+    const silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    for (int b = 0; b < bodies->count; b++) {
+        const struct silt_body *body = &bodies->body[b];
+        const size_t used = strlen(err->text);
+        snprintf(err->text + used, sizeof err->text - used, "\nbody '%s' was at (%g, %g) with the velocity (%.3g, %.3g) m/s; force of the water (%.3g, %.3g) N",
+                 run->scene->body[b].name, body->x[0], body->x[1], body->v[0], body->v[1], body->force[0], body->force[1]);
+    }
+    return status;
+}
+
 static silt_status run_step(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
-    memset(run->phase, 0, sizeof run->phase);
+    silt_clock_reset();
     const double before = run->dt;
     run->dt_old = run->step > 0 ? before : 0;
     const double wanted = step_wanted(run);
@@ -323,14 +384,14 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     run->whole = false;
 
     if (scene->bed.on)
-        PHASE(bed, {
+        SILT_CLOCKED(bed, {
             if (scene->fluid.on)
                 silt_bed_wear(&run->bed, scene, &run->nodes, &run->mesh, &run->locator, run->dt);
             silt_run_release(run);
         });
     if (run->coupling) {
         silt_status status = SILT_OK;
-        PHASE(dem, {
+        SILT_CLOCKED(coupling, {
             silt_run_place(run);
             load_bodies(run, before);
             silt_nodes moving = run->nodes; // with the velocity that the drag was solved with
@@ -340,9 +401,10 @@ static silt_status run_step(silt_run *run, silt_error *err) {
             if (status == SILT_OK)
                 status = silt_coupling_dem.finish(run->coupling, err);
         });
-        SILT_TRY(status);
+        if (status != SILT_OK)
+            return grains_failed(run, status, err);
         if (scene->bed.on)
-            PHASE(bed, status = silt_run_deposit(run, err));
+            SILT_CLOCKED(bed, status = silt_run_deposit(run, err));
         SILT_TRY(status);
     }
     if (scene->fluid.on) {
@@ -376,8 +438,11 @@ static void pressure_show(silt_run *run) {
 
 // porosity at the new places, for the ledger and the frames
 static silt_status step_close(silt_run *run, silt_error *err) {
+    silt_status status = SILT_OK;
     if (run->coupling && run->scene->fluid.on)
-        SILT_TRY(silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
+        SILT_CLOCKED(coupling,
+                     status = silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
+    SILT_TRY(status);
     silt_run_ledger(run);
     if (run->scene->fluid.on)
         pressure_show(run);
@@ -386,8 +451,9 @@ static silt_status step_close(silt_run *run, silt_error *err) {
 
 static silt_status step_output(silt_run *run, silt_error *err) {
     // a row cannot hold the time that writing it takes: it shows that of the row before
-    const double since = silt_seconds();
+    run_phases(run);
     run->phase[PHASE_output] = run->output_seconds;
+    silt_clock_to(CLOCK_output);
     silt_view view;
     run_view(run, &view);
     silt_gauges_read(run->gauges, &view, run->gauge);
@@ -401,8 +467,11 @@ static silt_status step_output(silt_run *run, silt_error *err) {
     if (run->fluid.iterations > run->summary.most_iterations)
         run->summary.most_iterations = run->fluid.iterations;
     run->summary.steps++;
-    run->output_seconds = silt_seconds() - since;
     run->whole = true;
+    double seconds[CLOCK_COUNT];
+    silt_clock_read(seconds);
+    run->output_seconds = seconds[CLOCK_output];
+    silt_clock_to(CLOCK_rest);
     return SILT_OK;
 }
 
@@ -441,7 +510,7 @@ static void run_failed(silt_run *run, silt_error *err) {
 
 // ---------------------------------------------------------------- open and close
 
-static void run_free(silt_run *run) {
+void silt_run_free(silt_run *run) {
     silt_coupling_dem.close(&run->coupling);
     silt_fluid_clear(&run->fluid);
     silt_size_free(&run->size);
@@ -487,6 +556,7 @@ static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_
     run->log = silt_text("%s/dem.log", out);
     run->worker = silt_worker_find(def->worker);
     run->started = silt_seconds();
+    silt_clock_reset();
     run->summary.status = "running";
     if (def->threads > 0)
         omp_set_num_threads(def->threads);
@@ -501,6 +571,12 @@ static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_
 
 // ---------------------------------------------------------------- the loop
 
+silt_status silt_run_advance(silt_run *run, silt_error *err) {
+    SILT_TRY(run_step(run, err));
+    SILT_TRY(step_close(run, err));
+    return step_output(run, err);
+}
+
 static double run_end(const silt_run *run) { return run->def.until > 0 ? run->def.until : run->scene->time.end; }
 
 static silt_status run_loop(silt_run *run, silt_error *err) {
@@ -512,11 +588,7 @@ static silt_status run_loop(silt_run *run, silt_error *err) {
     silt_view view;
 
     while (run->time < end * (1 - 1e-12) && (scene->time.steps == 0 || run->step < scene->time.steps)) {
-        status = run_step(run, err);
-        if (status == SILT_OK)
-            status = step_close(run, err);
-        if (status == SILT_OK)
-            status = step_output(run, err);
+        status = silt_run_advance(run, err);
         if (status != SILT_OK)
             break;
         const bool frame = run->tick == 0 && run->offset == 0;
@@ -558,7 +630,7 @@ static silt_status run_close(silt_run *run, silt_status status, silt_error *err)
         if (err)
             *err = late;
     }
-    run_free(run);
+    silt_run_free(run);
     return status;
 }
 
@@ -582,16 +654,20 @@ static silt_status run_start(silt_run *run, silt_error *err) {
     return step_output(run, err);
 }
 
+silt_status silt_run_open(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock,
+                          silt_error *err) {
+    SILT_TRY(run_begin(run, scene, def, out, lock, err));
+    return run_start(run, err);
+}
+
 silt_status silt_scene_run(const silt_scene *scene, const silt_run_def *def, silt_error *err) {
     silt_run run;
     int lock = -1;
     char *out = def->out ? silt_text("%s", def->out) : silt_folder_default(scene);
     silt_status status = silt_folder_prepare(out, def->force, &lock, err);
     if (status == SILT_OK) {
-        status = run_begin(&run, scene, def, out, lock, err);
         signals_catch();
-        if (status == SILT_OK)
-            status = run_start(&run, err);
+        status = silt_run_open(&run, scene, def, out, lock, err);
         if (status == SILT_OK)
             status = run_loop(&run, err);
         status = run_close(&run, status, err);
@@ -646,7 +722,7 @@ static silt_status resume_load(silt_run *run, const silt_scene *scene, const sil
             silt_walls_move(&run->walls, scene, run->time, 0);
         silt_store_close(&store);
         if (status != SILT_OK) {
-            run_free(run);
+            silt_run_free(run);
             step[k] = -1;
             continue;
         }
@@ -686,7 +762,7 @@ silt_status silt_run_resume(const silt_run_def *def, silt_error *err) {
     if (status == SILT_OK)
         status = silt_history_reopen(&run.history, run.out, scene, run.step, err);
     if (status != SILT_OK) {
-        run_free(&run); // what the folder says of the run before stays
+        silt_run_free(&run); // what the folder says of the run before stays
         goto done;
     }
     status = run_close(&run, run_loop(&run, err), err);

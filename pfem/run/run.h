@@ -93,6 +93,14 @@ struct silt_run {
     double box_lo[3], box_hi[3]; // what lies outside has left
 };
 
+// run.c -----------------------------------------------------------------------------------------------
+/** From nothing to the state at t = 0 with its row and frame in the folder `out`, which is there. To be freed also when it failed.
+ * @param lock  see above */
+silt_status silt_run_open(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock, silt_error *err);
+/** One step of the time loop with its row, and its frame if it is due; its clocks are there to be read until the next one begins. */
+silt_status silt_run_advance(silt_run *run, silt_error *err);
+void silt_run_free(silt_run *run);
+
 // ledger.c --------------------------------------------------------------------------------------------
 /** volume, mass, momentum, energy and sediment of the state, and their errors so far */
 void silt_run_ledger(silt_run *run);
