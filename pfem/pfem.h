@@ -18,7 +18,8 @@ typedef enum {
     NODE_CORNER,    // stays at a vertex or crease of the walls that points into the water; owner: element of the walls
     NODE_BED,       // on the bed's surface, fixed while the bed stands; owner: bed node
     NODE_BODY,      // on the outline of a rigid object, moves with it; owner: body
-    NODE_INLET,     // stays on the inlet line, velocity prescribed; owner: inlet
+    NODE_INLET,     // stays on the inlet line or polygon, velocity prescribed; owner: inlet
+    NODE_OPEN,      // stays on an opening behind which water stands at a level, on the surface slides along it; owner: opening
 } silt_node_kind;
 
 typedef struct silt_nodes {
@@ -166,7 +167,7 @@ double silt_region_distance(const silt_region *region, int dim, const double *x)
 // ---------------------------------------------------------------- mesh (mesh.c)
 
 /** kinds of boundary facets */
-typedef enum { FACET_FREE = 0, FACET_WALL, FACET_BED, FACET_BODY, FACET_INLET } silt_facet_kind;
+typedef enum { FACET_FREE = 0, FACET_WALL, FACET_BED, FACET_BODY, FACET_INLET, FACET_OPEN } silt_facet_kind;
 
 typedef struct silt_mesh {
     int64_t revision;  // rises at every rebuild; what is derived from the topology remembers it

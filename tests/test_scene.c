@@ -199,7 +199,7 @@ static void test_whole(void **state) {
     assert_true(f->rheology == RHEOLOGY_NEWTONIAN && f->yield_stress == 0 && f->flow_index == 1 && f->order == 2);
     assert_true(f->plastic_rate == 1e-3 && f->shuffle == 0 && f->n_size == 0 && f->size_growth == 0.3 && !f->cloud);
     assert_true(f->air_pressure == 0 && f->air_exponent == 1.4 && f->force.kind == FORMULA_NONE);
-    assert_true(s->period[0] == 0 && s->period[1] == 0 && isnan(f->outlet[0].level) && f->inlet[0].head.n_row == 0);
+    assert_true(s->period[0] == 0 && s->period[1] == 0 && f->outlet[0].level.n_row == 0 && f->inlet[0].head.n_row == 0);
     assert_true(f->alpha == 1.3 && f->merge == 0.3 && f->tolerance == 1e-6 && f->iterations == 12);
     assert_true(f->volume_control && f->volume_steps == 15 && f->volume_time == 0 && f->jitter == 0 && f->seed == 1);
     assert_int_equal(f->n_region, 3);
@@ -286,7 +286,7 @@ static void test_water(void **state) {
     assert_true(f->size_at[2].region.n_point == 4 && f->size_at[3].near == NEAR_WALLS);
     assert_true(f->size_at[4].near == NEAR_SURFACE && f->size_at[4].region.kind == 0);
     assert_true(f->inlet[0].drive == INLET_HEAD && silt_series_at(&f->inlet[0].head, 1, 5) == 1.25);
-    assert_true(f->outlet[0].level == 0.4);
+    assert_true(silt_series_at(&f->outlet[0].level, 1, 3) == 0.4);
     double v[3];
     silt_formula_acceleration(&f->force, 0.25, (double[]){7, 8}, v);
     assert_true(v[0] == 0.5 && v[1] == 0.5 && v[2] == 0);
@@ -365,6 +365,18 @@ static void test_space(void **state) {
     assert_true(g[1].from[2] == 0.25 && g[2].from[2] == 0 && g[4].from[0] == 1);
     silt_scene_free(&s);
     // a field in space
+    s = right(RIGHT "space.yaml", 0, NULL);
+    // openings: outlets count on after the inlets, normals into the water
+    assert_true(silt_opening_count(s) == 4 && s->fluid.inlet[0].n_corner == 3 && s->fluid.outlet[1].corner[11] == 1);
+    const silt_opening pipe = silt_opening_of(s, 0), sea = silt_opening_of(s, 3);
+    assert_true(pipe.inlet && !pipe.level && pipe.normal[0] == 1 && !sea.inlet && sea.normal[0] == -1 && sea.n_corner == 4);
+    assert_true(silt_series_at(silt_opening_of(s, 1).level, 1, 5) == 1.25 && silt_series_at(sea.level, 1, 7) == 1.5);
+    assert_true(fabs(silt_opening_height(&sea, (double[]){2.9, 0.5, 1.5}) - 0.1) < 1e-15);
+    assert_true(fabs(silt_opening_depth(&sea, (double[]){2.9, 0.2, 1.5}) - 0.2) < 1e-15);
+    assert_true(silt_opening_depth(&pipe, (double[]){0, 0.1, 0.2}) < 0 && silt_opening_depth(&pipe, (double[]){0, 0.5, 0.2}) > 0);
+    assert_true(silt_opening_on(s, (double[]){3, 0.5, 1.5}, 1e-9, false) == 3 && silt_opening_on(s, (double[]){0, 0.5, 0.1}, 1e-9, true) == 0);
+    assert_true(silt_opening_on(s, (double[]){0, 0.5, 0.1}, 1e-9, false) == -1);
+    silt_scene_free(&s);
     s = right(RIGHT "space.yaml", 1, (const char *[]){"fluid.velocity={formula: field, file: points3.csv}"});
     silt_formula_velocity(&s->fluid.velocity, 9.81, (double[]){0.1, 0.2, 0.3}, v);
     assert_true(fabs(v[0] - 0.1) + fabs(v[1] - 0.2) + fabs(v[2] - 0.3) < 1e-14);

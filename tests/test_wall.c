@@ -1116,9 +1116,64 @@ static void test_empty(void **state) {
     }
 }
 
+// ---------------------------------------------------------------- openings
+
+// a hole in a side of a box: the area that is left, joined corner by corner but for the hole's rim
+static void test_hole(void **state) {
+    (void)state;
+    double corner[12] = {2, 0.4, 0.3, 2, 0.4, 0.7, 2, 0.6, 0.7, 2, 0.6, 0.3};
+    silt_outlet outlet = {.n_corner = 4, .corner = corner};
+    for (int whole = 0; whole < 2; whole++) {
+        bench *b = bench_new(3);
+        bench_box(b, 2, 1, 1, WALL_SLIP);
+        b->scene.fluid.outlet = &outlet;
+        b->scene.fluid.n_outlet = 1;
+        for (int c = 0; c < 4 && whole; c++) { // the whole side: nothing is left of it
+            corner[3 * c + 1] = c < 2 ? 0 : 1;
+            corner[3 * c + 2] = c == 1 || c == 2 ? 1 : 0;
+        }
+        bench_make(b);
+        double area = 0, rim = 0;
+        for (int e = 0; e < b->walls.count; e++) {
+            const double(*c)[3] = (const double(*)[3])b->walls.corner[e];
+            double u[3], v[3], n[3];
+            for (int d = 0; d < 3; d++) {
+                u[d] = c[1][d] - c[0][d];
+                v[d] = c[2][d] - c[0][d];
+            }
+            wall_cross(u, v, n);
+            area += 0.5 * sqrt(wall_dot(n, n));
+            for (int k = 0; k < 3; k++)
+                if (b->walls.joined[e][k] < 0)
+                    rim += sqrt(silt_square(c[(k + 1) % 3][0] - c[k][0]) + silt_square(c[(k + 1) % 3][1] - c[k][1]) +
+                                silt_square(c[(k + 1) % 3][2] - c[k][2]));
+        }
+        assert_near(area, whole ? 9 : 10 - 0.08, 1e-12);
+        assert_near(rim, whole ? 4 : 1.2, 1e-12);
+        assert_near(distance_at(b, 1.9, 0.5, 0.35, NULL), whole ? 0.35 : hypot(0.1, 0.05), 1e-12);
+        if (!whole)
+            assert_near(distance_at(b, 2.1, 0.5, 0.35, NULL), -hypot(0.1, 0.05), 1e-12);
+        bench_free(b);
+    }
+    // in the plane: what is left on both sides
+    bench *b = bench_new(2);
+    bench_chain(b, 4, (const double[]){0, 0, 2, 0, 2, 1, 0, 1}, true, WALL_SLIP);
+    outlet = (silt_outlet){.from = {2, 0.2}, .to = {2, 0.5}};
+    b->scene.fluid.outlet = &outlet;
+    b->scene.fluid.n_outlet = 1;
+    bench_make(b);
+    double length = 0;
+    for (int e = 0; e < b->walls.count; e++)
+        length += hypot(b->walls.to[e][0] - b->walls.from[e][0], b->walls.to[e][1] - b->walls.from[e][1]);
+    assert_near(length, 6 - 0.3, 1e-12);
+    assert_int_equal(b->walls.count, 5);
+    bench_free(b);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_empty),          cmocka_unit_test(test_distance_plane), cmocka_unit_test(test_distance_plate),
+        cmocka_unit_test(test_empty),          cmocka_unit_test(test_hole),
+                  cmocka_unit_test(test_distance_plane), cmocka_unit_test(test_distance_plate),
         cmocka_unit_test(test_distance_box),   cmocka_unit_test(test_distance_step),  cmocka_unit_test(test_distance_ball),
         cmocka_unit_test(test_distance_many),  cmocka_unit_test(test_files_agree),    cmocka_unit_test(test_files_wrong),
         cmocka_unit_test(test_files_fuzzed),   cmocka_unit_test(test_share),          cmocka_unit_test(test_round_tank),

@@ -128,6 +128,8 @@ void silt_assemble_geometry(silt_fluid *f, const silt_step *step, double dt) {
     BY_DIM(geometry, f, step, dt);
     if (f->wall_normals.n_row)
         silt_hold_bent(f, step);
+    for (int i = 0; f->potential && i < f->n_node; i++)
+        f->potential[i] = step->scene->fluid.density * silt_formula_potential(&step->scene->fluid.force, f->x_mid + f->dim * i);
 }
 
 KERNEL pressure(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, double *lost) {
@@ -158,6 +160,22 @@ KERNEL pressure(const int D, const silt_fluid *f, const silt_mesh *mesh, const d
 void silt_assemble_pressure(const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, double *lost) {
     BY_DIM(pressure, f, mesh, p, out, lost);
 }
+
+KERNEL potential(const int D, const silt_fluid *f, const silt_mesh *mesh, double *out) {
+    for (int e = 0; e < f->n_cell; e++) {
+        const int *cell = mesh->cell[e];
+        const double *flux = f->flux + (D + 1) * D * e;
+        for (int d = 0; d < D; d++) {
+            double slope = 0;
+            for (int a = 0; a <= D; a++)
+                slope += f->potential[cell[a]] * flux[D * a + d];
+            for (int a = 0; a <= D; a++)
+                out[D * cell[a] + d] -= slope / (D + 1);
+        }
+    }
+}
+
+void silt_assemble_potential(const silt_fluid *f, const silt_mesh *mesh, double *out) { BY_DIM(potential, f, mesh, out); }
 
 KERNEL viscous(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, double factor, double *out) {
     for (int e = 0; e < f->n_cell; e++) {
@@ -234,7 +252,7 @@ KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const doubl
         for (int d = 0; d < D; d++) {
             double slope = 0, mean = 0;
             for (int a = 0; a <= D; a++) {
-                slope += p[cell[a]] * flux[D * a + d];
+                slope += (p[cell[a]] + (f->potential ? f->potential[cell[a]] : 0)) * flux[D * a + d];
                 mean += f->projection[D * cell[a] + d] / (D + 1);
             }
             stable[d] = f->tau[e] * f->inverse[e] * (slope + f->cell_volume[e] * mean);
@@ -272,7 +290,7 @@ KERNEL projection(const int D, silt_fluid *f, const silt_mesh *mesh, const doubl
         for (int d = 0; d < D; d++) {
             double slope = 0;
             for (int a = 0; a <= D; a++)
-                slope += p[cell[a]] * flux[D * a + d];
+                slope += (p[cell[a]] + (f->potential ? f->potential[cell[a]] : 0)) * flux[D * a + d];
             for (int a = 0; a <= D; a++)
                 f->projection[D * cell[a] + d] -= f->tau[e] * slope;
         }

@@ -7,7 +7,7 @@ static double gravity_size(const silt_scene *scene) {
     return sqrt(silt_square(scene->gravity[0]) + silt_square(scene->gravity[1]) + silt_square(scene->gravity[2]));
 }
 
-// a piece of water without free surface can neither grow nor shrink: there debts only move
+// a piece of water without free surface or opening with a level can neither grow nor shrink: there debts only move
 static void keep_closed(silt_fluid *f, const silt_mesh *mesh) {
     int *parent = silt_alloc((size_t)f->n_node + 1, sizeof *parent);
     double *rate = silt_alloc((size_t)f->n_node + 1, sizeof *rate), *volume = silt_alloc((size_t)f->n_node + 1, sizeof *volume);
@@ -20,6 +20,9 @@ static void keep_closed(silt_fluid *f, const silt_mesh *mesh) {
         rate[r] += f->rate[i];
         volume[r] += mesh->surface[i] ? HUGE_VAL : f->volume[i];
     }
+    for (int k = 0; k < mesh->n_facet; k++)
+        if (mesh->facet_kind[k] == FACET_OPEN)
+            volume[silt_group_find(parent, mesh->facet[k][0])] = HUGE_VAL;
     for (int i = 0; i < f->n_node; i++) {
         const int r = silt_group_find(parent, i);
         if (isfinite(volume[r]) && volume[r] > 0)
@@ -58,7 +61,8 @@ void silt_debts_ask(silt_fluid *f, const silt_step *s) {
             debt[i] += change[i];
     }
     for (int i = 0; i < f->n_node; i++)
-        if (mesh->wet[i])
+        // with the Laplacian the surface's nodes cannot be asked
+        if (mesh->wet[i] && !(mesh->surface[i] && s->scene->fluid.pressure == PRESSURE_LAPLACIAN))
             f->rate[i] = silt_clamp(debt[i], -DEBT_CAP * f->volume[i], DEBT_CAP * f->volume[i]) / time;
     keep_closed(f, mesh);
 }
@@ -74,11 +78,14 @@ bool silt_debts_relent(silt_fluid *f) {
 }
 
 void silt_mobile_find(silt_fluid *f, const silt_mesh *mesh, double *p) {
-    // a node whose whole surroundings are held has no say in its volume
+    // a node whose whole surroundings are held has no say in its volume. But in the corner of a lid it keeps its equation, which the
+    // smoothing meets: what the lid drags into that corner and out of the other must have its like, or a closed tank cannot be full
     for (int i = 0; i < f->n_node; i++) {
         f->mobile[i] = 0;
-        for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++)
-            f->mobile[i] |= f->hold[mesh->neighbour[k]] != HOLD_ALL;
+        for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++) {
+            const int j = mesh->neighbour[k];
+            f->mobile[i] |= f->hold[j] != HOLD_ALL || (f->belt && silt_length(f->dim, f->belt + f->dim * j) > 0);
+        }
         if (!f->mobile[i])
             f->rate[i] = 0;
     }

@@ -4,12 +4,14 @@
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
 #define FLUID_FACTOR 5.0     // the same, from which a factor of the momentum pays
 #define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
+#define EXPLICIT_SHARE 0.02 // of the water that may be too stiff for explicit viscosity: slivers
 #define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 
 void silt_fluid_clear(silt_fluid *f) {
-    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->inverse, f->mu, f->tau, f->share, f->belt, f->wall_force, f->shift, f->mass, f->volume,
+    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
+                       f->level_force, f->level_brake, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
                        f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->normal, f->given, f->cg[0],
                        f->cg[1], f->cg[2]};
@@ -54,6 +56,7 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         ROOM(inertia, 1, have_nodes, need);
         ROOM(friction, 1, have_nodes, need);
         ROOM(residual, 1, have_nodes, need);
+        ROOM(stand, 1, have_nodes, need);
         ROOM(rate, 1, have_nodes, need);
         ROOM(increment, 1, have_nodes, need);
         ROOM(hold, 1, have_nodes, need);
@@ -79,12 +82,19 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         f->share = NULL;
         f->share_capacity = 0;
     }
+    if (s->scene->fluid.force.kind == FORMULA_CENTRAL && !s->drag)
+        SILT_RESERVE(f->potential, f->potential_capacity, n_node + 1);
     bool belts = false;
     for (int k = 0; k < s->scene->n_wall; k++)
         for (int d = 0; d < 3; d++)
             belts |= s->scene->wall[k].velocity[d] != 0;
     if (belts)
         SILT_RESERVE(f->belt, f->belt_capacity, D * n_node + 1);
+    if (silt_levels_any(s->scene)) {
+        SILT_RESERVE(f->level_force, f->level_capacity, D * n_node + 1);
+        SILT_RESERVE(f->level_brake, f->level_brake_capacity, n_node + 1);
+        memset(f->level_force, 0, (size_t)(D * n_node) * sizeof(double));
+    }
     if (s->scene->fluid.volume_control)
         SILT_RESERVE(f->shift, f->shift_capacity, D * n_node + 1);
     f->n_node = n_node;
@@ -108,9 +118,13 @@ static double mean_stiffness(const silt_fluid *f, const silt_step *s) {
     return mu / volume * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
 }
 
-// acceleration besides gravity, half way through the step
+// acceleration besides gravity that is loaded at the nodes, half way through the step. A central one is not: its potential is
+// taken as a P1 field (silt_assemble_potential), since rest under a load at the nodes is true to h^2 only.
 static void body_force(const silt_fluid *f, const silt_step *s, int i, double a[3]) {
-    silt_formula_acceleration(&s->scene->fluid.force, s->time + 0.5 * s->dt, f->x_mid + f->dim * i, a);
+    if (f->potential)
+        memcpy(a, s->scene->fluid.force.vector, 3 * sizeof *a);
+    else
+        silt_formula_acceleration(&s->scene->fluid.force, s->time + 0.5 * s->dt, f->x_mid + f->dim * i, a);
 }
 
 // Lumped masses make waves slow, by 0.3 % at 40 nodes a wave. One sweep towards the consistent mass: with the acceleration
@@ -134,7 +148,7 @@ static void find_excess(silt_fluid *f, const silt_step *s, const double *right) 
     for (int i = 0; i < f->n_node; i++) {
         for (int d = 0; d < D; d++)
             a[D * i + d] = s->mesh->wet[i] && f->mass[i] > 0 ? a[D * i + d] / f->mass[i] : 0;
-        // a body force is loaded at the nodes, not as a P1 field: it has no excess, whatever holds the nodes
+        // such a body force is loaded at the nodes, not as a P1 field: it has no excess, whatever holds the nodes
         silt_hold_project(f, i, a + D * i);
         if (s->scene->fluid.force.kind != FORMULA_NONE) {
             double b[3];
@@ -160,9 +174,13 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
             for (int d = 0; d < D; d++)
                 out[D * i + d] += f->mass[i] * a[d];
         }
+    if (f->potential)
+        silt_assemble_potential(f, s->mesh, out);
     if (f->law.n_point)
         for (int k = 0; k < D * f->n_node; k++)
             out[k] += f->wall_force[k];
+    for (int k = 0; f->level_force && k < D * f->n_node; k++)
+        out[k] += f->level_force[k];
     if (s->pockets)
         silt_pockets_force(s->pockets, D, 0.5 * s->dt, f->w, out);
     silt_assemble_pressure(f, s->mesh, p, out, NULL);
@@ -170,11 +188,14 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
 
 // resistance of the present iterate: traction of walls, then geometry, then viscosity of every cell
 static void resist(silt_fluid *f, const silt_step *s) {
-    if (f->law.n_point) {
+    if (f->law.n_point || f->level_force)
         memset(f->friction, 0, (size_t)f->n_node * sizeof *f->friction);
+    if (f->law.n_point) {
         memset(f->wall_force, 0, (size_t)(f->dim * f->n_node) * sizeof *f->wall_force);
         silt_wall_law_traction(&f->law, s->scene, f->dim, f->w, f->friction, f->wall_force);
     }
+    if (f->level_force)
+        silt_levels_load(f, s);
     silt_assemble_geometry(f, s, s->dt);
     if (silt_viscosity_varies(s->scene) && (f->iterations < FLUID_CLOSURE || s->scene->fluid.rheology != RHEOLOGY_NEWTONIAN))
         silt_viscosity_update(s->scene, s->nodes, s->mesh, &f->depth, f->flux, f->inverse, f->w, f->iterations ? 0.5 : 1, f->mu,
@@ -212,8 +233,9 @@ static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid,
         if (viscid)
             silt_assemble_viscous(f, s->mesh, f->w, -1, f->force);
         for (int i = 0; i < f->n_node; i++) {
+            const double stand = viscid ? f->stand[i] : 0;
             for (int d = 0; d < D; d++)
-                f->star[D * i + d] = f->force[D * i + d] / f->inertia[i];
+                f->star[D * i + d] = (f->force[D * i + d] + stand * f->w[D * i + d]) / (f->inertia[i] + stand);
             silt_hold_impose(f, i, f->star + D * i);
         }
     }
@@ -287,11 +309,10 @@ static silt_status project_start(silt_fluid *f, const silt_step *s, const double
             silt_hold_turn(f, i, v + D * i);
     silt_assemble_projection(f, s->mesh, p);
     const double before = kinetic_energy(f, s, v);
-    for (int pass = 0; pass < 2; pass++) {
-        silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
-        SILT_TRY(pressure_increment(f, s, 1e-2, err));
-        correct(f, s, f->increment, v);
-    }
+    // once: what is left is the smoothing's, and more of it makes the pressure rougher
+    silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
+    SILT_TRY(pressure_increment(f, s, 1e-2, err));
+    correct(f, s, f->increment, v);
     f->projected = before - kinetic_energy(f, s, v);
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i])
@@ -307,7 +328,7 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
     for (int i = 0; i < f->n_node && !any; i++)
         any = f->rate[i] != 0;
     memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);
-    for (int pass = 0; pass < 4 && any; pass++) {
+    for (int pass = 0; pass < 2 && any; pass++) {
         memset(f->increment, 0, (size_t)f->n_node * sizeof *f->increment);
         silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
         for (int i = 0; i < f->n_node; i++)
@@ -348,6 +369,8 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
             const int k = D * i + d;
             out[k] -= loose[d];
             f->worked += dt * out[k] * f->w[k];
+            if (f->level_force)
+                f->worked += dt * (f->level_force[k] - f->level_brake[i] * f->w[k]) * f->w[k];
             unbalanced[d] += loose[d];
             f->momentum_scale += fabs(f->mass[i] * s->scene->gravity[d]) + fabs(f->inertia[i] * (f->w[k] - v[k]));
             if (drag) {
@@ -435,6 +458,32 @@ static silt_status correct_whole(silt_fluid *f, const silt_step *s, silt_error *
     return status;
 }
 
+// Explicit viscosity: f->stand holds the nodes that it would make unstable (point by point implicit, the fixed point is the same);
+// a step in which that is more than what stands in slivers is too long. Two passes are the midpoint rule, which stands steps of 2
+// over the largest eigenvalue of M^-1 K: at most twice the largest share of the diagonal (square lattice; 1.5 on even triangles).
+static silt_status explicit_limit(silt_fluid *f, const silt_step *s, silt_error *err) {
+    double held = 0, all = 0;
+    memset(f->stand, 0, (size_t)f->n_node * sizeof *f->stand);
+    silt_assemble_viscous_diagonal(f, s->mesh, f->stand);
+    for (int i = 0; i < f->n_node; i++) {
+        f->stand[i] = silt_max(0, 2 * f->stand[i] - f->inertia[i]);
+        all += s->mesh->wet[i] ? f->volume[i] : 0;
+        held += f->stand[i] > 0 && f->hold[i] != HOLD_ALL ? f->volume[i] : 0;
+    }
+    if (held <= EXPLICIT_SHARE * all)
+        return SILT_OK;
+    return silt_fail(err, SILT_FAILED, "a step of %.3g s is too long for explicit viscosity (fluid.scheme: implicit knows no limit)", s->dt);
+}
+
+// the largest way that an iterate's change of velocity makes in the step, over the local size: continuity does not see what swirls
+static double swirl(const silt_fluid *f, const silt_step *s) {
+    double most = 0;
+    for (int i = 0; i < f->n_node; i++)
+        for (int d = 0; d < f->dim && s->mesh->wet[i]; d++)
+            most = silt_max(most, fabs(f->star[f->dim * i + d] - f->w[f->dim * i + d]) / silt_node_h(s->nodes, i, s->scene->fluid.size));
+    return most * s->dt;
+}
+
 static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, silt_error *err) {
     const silt_fluid_def *def = &s->scene->fluid;
     const bool consistent = def->pressure == PRESSURE_CONSISTENT;
@@ -456,13 +505,21 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         if (f->iterations == 0) {
             if (choose_theta(f, s))
                 silt_assemble_geometry(f, s, s->dt);
+            if (def->scheme == SCHEME_FRACTIONAL)
+                SILT_TRY(explicit_limit(f, s, err));
             silt_mobile_find(f, s->mesh, p);
             whole = direct && mean_stiffness(f, s) > FLUID_STIFF; // a stiff cell here and there is no reason
             SILT_CLOCKED(matrix,
                          status = silt_pressure_factor(f->pressure, f, s, !direct && stiffness(f, s) > FLUID_STIFF, err));
             SILT_TRY(status);
-            if (f->theta < 0.75 && !s->drag)
-                SILT_TRY(project_start(f, s, p, err));
+            if (f->theta < 0.75 && !s->drag) {
+                // a first pressure, nought, does not balance the smoothing of the potential
+                double *potential = f->potential;
+                f->potential = first ? NULL : potential;
+                status = project_start(f, s, p, err);
+                f->potential = potential;
+                SILT_TRY(status);
+            }
             if (f->shift) {
                 silt_assemble_geometry(f, s, s->dt);
                 SILT_TRY(shift_find(f, s, err));
@@ -492,7 +549,8 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         const double *place = s->nodes->x + D * worst_node;
         if (!isfinite(f->worst))
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
-        const bool fine = f->worst <= (first ? 0.1 : 1) * def->tolerance;
+        const bool passed = def->scheme == SCHEME_IMPLICIT || stiff == 0 || f->iterations > 0;
+        const bool fine = passed && f->worst <= (first ? 0.1 : 1) * def->tolerance && (!first || swirl(f, s) <= def->tolerance);
         // at the end of the iterations a small residual is accepted; a first pressure takes longer to meet its projection
         if (fine || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);
@@ -582,6 +640,8 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
             nodes->p[i] = p[i];
             f->solved_volume += f->residual[i] * s->dt;
             nodes->debt[i] -= (f->rate[i] + (f->mobile[i] != 1 ? f->withheld[i] : 0)) * s->dt;
+            if (def->pressure == PRESSURE_LAPLACIAN && s->mesh->surface[i]) // no continuity there: what the node gained
+                nodes->debt[i] -= f->residual[i] * s->dt;
             f->given_back += f->rate[i] * s->dt;
             if (!s->mesh->wet[i])
                 continue;

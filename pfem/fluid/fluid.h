@@ -13,8 +13,6 @@ typedef struct silt_pressure silt_pressure; // the pressure matrix and its facto
 typedef struct silt_stiff silt_stiff;       // factors of momentum and continuity where viscosity is stiff, stiff.c
 typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
 
-/** cholmod_factorize on one thread: CHOLMOD 3 asks OpenMP for four, however many there are, to fill in small maps */
-int silt_factorize(void *matrix, void *factor, void *common);
 
 /** what a step sees */
 typedef struct silt_step {
@@ -29,7 +27,8 @@ typedef struct silt_step {
 
 /** working space and results of a step; arrays grow only */
 typedef struct silt_fluid {
-    int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity;
+    int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity,
+        potential_capacity, level_capacity, level_brake_capacity;
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
@@ -39,6 +38,10 @@ typedef struct silt_fluid {
     double *share;        // owned, dim + 1 per cell, int of solid share times N_i over the volume; NULL without grains
     double *wall_force;   // owned, dim per node, N, explicit part of the law of the wall's traction; NULL without such walls
     double *shift;        // owned, dim per node, m/s: carries positions, not momentum, to where debts are paid; NULL without volume control
+    double *level_force;  // owned, dim per node, N, of the water behind openings with a level; NULL without such openings
+    double *level_brake;  // owned, per node, kg/s, part of friction: pressure that water loses as it comes in, over its speed
+    double *stand;        // owned, per node, kg/s, added to both sides where explicit viscosity would not be stable
+    double *potential;    // owned, per node, Pa, density times the potential of a central body force at x_mid; NULL without one
     double *belt;         // owned, dim per node, velocity of a wall's surface along itself; NULL without such walls
     double *mass;         // owned, per node, lumped mass of water, kg
     double *volume;       // owned, per node, lumped volume of the cells
@@ -102,21 +105,35 @@ void silt_hold_project(const silt_fluid *fluid, int i, double *v);
 /** v with its held components replaced by the given ones */
 void silt_hold_impose(const silt_fluid *fluid, int i, double *v);
 
+// level.c -------------------------------------------------------------------------------------------------
+bool silt_levels_any(const silt_scene *scene);
+/** normals of the walls beside an opening among a node's walls. @return how many */
+int silt_level_sides(const silt_walls *walls, const silt_opening *opening, const int wall[3], const double *side[3]);
+/** unit direction in which a node on an opening crosses it, to the front, along the walls beside it */
+void silt_level_way(const silt_opening *opening, int n, const double *const side[3], double way[3]);
+/** how a node on an opening with a level is held: silt_walls_hold */
+silt_hold silt_level_hold(const silt_step *step, int i, double vector[3]);
+/** Pressure of the water behind openings, p = rho g (level - height), less rho u^2/2 where it comes in: level_force and
+ * level_brake, the latter added to friction. */
+void silt_levels_load(silt_fluid *fluid, const silt_step *step);
+
 // assemble.c ---------------------------------------------------------------------------------------------
 /** geometry, masses and stabilisation on the mesh half way along dt w; dt = 0: where the nodes are */
 void silt_assemble_geometry(silt_fluid *fluid, const silt_step *step, double dt);
 /** out += G p; adds to lost (may be NULL) what acts on the grains */
 void silt_assemble_pressure(const silt_fluid *fluid, const silt_mesh *mesh, const double *p, double *out, double *lost);
+/** out -= int N_i grad potential: at rest the pressure answers it to rounding, on any mesh */
+void silt_assemble_potential(const silt_fluid *fluid, const silt_mesh *mesh, double *out);
 /** out += factor K v: viscous force, deviatoric */
 void silt_assemble_viscous(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, double factor, double *out);
 /** diagonal += diagonal of K, its mean over the components */
 void silt_assemble_viscous_diagonal(const silt_fluid *fluid, const silt_mesh *mesh, double *diagonal);
 /** out += (lumped - consistent mass) a */
 void silt_assemble_mass_excess(const silt_fluid *fluid, const silt_mesh *mesh, double density, const double *a, double *out);
-/** residual of continuity: G^T v + L p + Q pi - source - rate (NULL: 0); where no velocity can mend it, of its smoothing alone */
+/** residual of continuity, p with the potential of a central force: G^T v + L p + Q pi - source - rate (NULL: 0); where no velocity can mend it, of its smoothing alone */
 void silt_assemble_continuity(silt_fluid *fluid, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
                               const double *p);
-/** pi = -M^-1 Q^T p: the recovered pressure gradient, lumped */
+/** pi = -M^-1 Q^T p: the recovered gradient, lumped, of the pressure with the potential of a central force */
 void silt_assemble_projection(silt_fluid *fluid, const silt_mesh *mesh, const double *p);
 /** out = G^T v + L p, without sources and projection (the pressure system applied) */
 void silt_assemble_divergence(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, const double *p, double *out);

@@ -130,6 +130,8 @@ void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
             memcpy(f->given + D * i, nodes->v + D * i, (size_t)D * sizeof(double));
         else if (nodes->kind[i] == NODE_FLUID && nodes->wall[i][0] < 0)
             f->hold[i] = HOLD_FREE;
+        else if (nodes->kind[i] == NODE_OPEN)
+            f->hold[i] = (uint8_t)silt_level_hold(s, i, vector);
         else if (nodes->kind[i] == NODE_FLUID) {
             f->hold[i] = (uint8_t)silt_walls_held(s->walls, s->scene, &f->wall_normals, nodes, i, vector, given);
             memcpy(f->given + D * i, given, (size_t)D * sizeof(double));

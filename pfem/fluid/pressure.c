@@ -1,23 +1,17 @@
 // the pressure system. 2-D: assembled row by row from the node's gradients, factored by CHOLMOD. 3-D: conjugate gradients on
 // the same operator, applied cell by cell, preconditioned by the factor of a compact Laplacian that resembles it
-#include <cholmod.h>
-#include <dlfcn.h>
-#include <omp.h>
-
+#include "factor.h"
 #include "fluid.h"
 
 /** a symmetric matrix and its factor */
 typedef struct silt_system {
-    cholmod_factor *factor; // owned
-    cholmod_sparse *matrix; // owned, lower triangle by columns
-    int64_t revision;       // of the mesh that pattern and factor belong to
+    silt_factor factor;     // owned
+    int64_t revision;       // of the mesh that the pattern belongs to
     bool compact;           // neighbours only, not nodes at distance two
 } silt_system;
 
 struct silt_pressure {
-    cholmod_common common;
     silt_system main, stiff;   // S + L or a compact stand-in; L and the mass matrix over the viscosity
-    cholmod_dense *solution, *work_y, *work_e; // owned
     int n;
     double *gradient;       // owned, dim per entry, G_ij along the mesh's neighbour lists
     int *mirror;            // owned, index of (j, i) for the entry (i, j)
@@ -31,31 +25,14 @@ struct silt_pressure {
     int gradient_capacity, mirror_capacity, place_capacity, pinned_capacity, row_capacity, mark_capacity, list_capacity;
 };
 
-silt_pressure *silt_pressure_create(void) {
-    silt_pressure *pressure = silt_alloc(1, sizeof *pressure);
-    cholmod_start(&pressure->common);
-    pressure->common.print = 0;
-    pressure->common.nmethods = 1;
-    pressure->common.method[0].ordering = CHOLMOD_AMD;
-    pressure->common.postorder = 1;
-    pressure->common.quick_return_if_not_posdef = 1;
-    // one BLAS thread: its results depend on the number of threads
-    void (*threads)(int);
-    *(void **)&threads = dlsym(RTLD_DEFAULT, "openblas_set_num_threads");
-    if (threads)
-        threads(1);
-    return pressure;
-}
+silt_pressure *silt_pressure_create(void) { return silt_alloc(1, sizeof(silt_pressure)); }
 
 void silt_pressure_forget(silt_pressure *pressure) {
     if (!pressure)
         return;
-    silt_system *both[2] = {&pressure->main, &pressure->stiff};
-    for (int k = 0; k < 2; k++) {
-        cholmod_free_factor(&both[k]->factor, &pressure->common);
-        cholmod_free_sparse(&both[k]->matrix, &pressure->common);
-        both[k]->revision = -1;
-    }
+    silt_factor_clear(&pressure->main.factor);
+    silt_factor_clear(&pressure->stiff.factor);
+    pressure->main.revision = pressure->stiff.revision = -1;
 }
 
 void silt_pressure_free(silt_pressure **pressure) {
@@ -63,10 +40,6 @@ void silt_pressure_free(silt_pressure **pressure) {
         return;
     silt_pressure *p = *pressure;
     silt_pressure_forget(p);
-    cholmod_free_dense(&p->solution, &p->common);
-    cholmod_free_dense(&p->work_y, &p->common);
-    cholmod_free_dense(&p->work_e, &p->common);
-    cholmod_finish(&p->common);
     free(p->gradient);
     free(p->mirror);
     free(p->place);
@@ -82,7 +55,7 @@ void silt_pressure_free(silt_pressure **pressure) {
     *pressure = NULL;
 }
 
-// pieces of water without a free surface know their pressure up to a constant: one node each is pinned
+// pieces of water without a free surface, or an opening with a level, know their pressure up to a constant: one node each is pinned
 static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     SILT_RESERVE(p->pinned, p->pinned_capacity, mesh->n_node + 1);
     int *parent = silt_alloc((size_t)mesh->n_node + 1, sizeof *parent);
@@ -98,6 +71,9 @@ static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     for (int i = 0; i < mesh->n_node; i++)
         if (mesh->surface[i])
             p->pinned[silt_group_find(parent, i)] = 0;
+    for (int k = 0; k < mesh->n_facet; k++)
+        if (mesh->facet_kind[k] == FACET_OPEN)
+            p->pinned[silt_group_find(parent, mesh->facet[k][0])] = 0;
     free(parent);
 }
 
@@ -121,7 +97,6 @@ static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh
     }
 
     // count, then fill
-    cholmod_free_sparse(&system->matrix, &p->common);
     int *start = silt_alloc((size_t)n + 1, sizeof *start);
     for (int pass = 0; pass < 2; pass++) {
         for (int j = 0; j < n; j++)
@@ -153,16 +128,15 @@ static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh
                         p->list[b + 1] = p->list[b];
                     p->list[b + 1] = key;
                 }
-                memcpy((int *)system->matrix->i + filled, p->list, (size_t)count * sizeof(int));
+                memcpy(system->factor.index + filled, p->list, (size_t)count * sizeof(int));
             }
             start[j] = filled;
             filled += count;
         }
         start[n] = filled;
         if (pass == 0)
-            system->matrix = cholmod_allocate_sparse((size_t)n, (size_t)n, (size_t)filled, 1, 1, -1, CHOLMOD_REAL, &p->common);
+            memcpy(silt_factor_pattern(&system->factor, n, filled), start, ((size_t)n + 1) * sizeof *start);
     }
-    memcpy(system->matrix->p, start, ((size_t)n + 1) * sizeof *start);
     free(start);
     system->compact = compact;
     system->revision = mesh->revision;
@@ -232,40 +206,29 @@ static void boundary_diagonal(silt_pressure *p, silt_fluid *f, const silt_mesh *
         for (int a = 0; a <= D; a++)
             for (int d = 0; d < D; d++)
                 normal[D * mesh->cell[e][a] + d] += f->flux[(D + 1) * D * e + D * a + d];
+    // openings with a level give their pressure as the surface does
+    for (int k = 0; k < mesh->n_facet; k++)
+        for (int a = 0; a < D && mesh->facet_kind[k] == FACET_OPEN; a++)
+            p->extra[mesh->facet[k][a]] = 1;
     for (int i = 0; i < p->n; i++) {
         silt_hold_project(f, i, normal + D * i);
         double square = 0;
         for (int d = 0; d < D; d++)
             square += silt_square(normal[D * i + d]);
-        p->extra[i] = mesh->surface[i] ? square / f->inertia[i] : 0;
+        p->extra[i] = mesh->surface[i] || p->extra[i] > 0 ? square / f->inertia[i] : 0;
     }
 }
 
-int silt_factorize(void *matrix, void *factor, void *common) {
-    const int levels = omp_get_max_active_levels();
-    omp_set_max_active_levels(0);
-    const int done = cholmod_factorize(matrix, factor, common);
-    omp_set_max_active_levels(levels);
-    return done;
-}
-
-static silt_status system_factor(silt_pressure *p, silt_system *system, const silt_fluid *f, const silt_step *s, bool fresh, silt_error *err) {
-    if (fresh) {
-        cholmod_free_factor(&system->factor, &p->common);
-        SILT_CLOCKED(analyse, system->factor = cholmod_analyze(system->matrix, &p->common));
-    }
-    cholmod_factor *factor = system->factor;
-    int done = 0;
-    if (factor)
-        SILT_CLOCKED(factor, done = silt_factorize(system->matrix, factor, &p->common));
-    if (!done || p->common.status == CHOLMOD_NOT_POSDEF) {
-        const int bad = factor ? (int)factor->minor : 0;
-        const int node = factor && factor->Perm && bad < p->n ? ((int *)factor->Perm)[bad] : 0;
-        const double *x = s->nodes->x + f->dim * node;
-        system->revision = -1;
-        return silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite near (%g, %g)", x[0], x[1]);
-    }
-    return SILT_OK;
+static silt_status system_factor(silt_system *system, const silt_fluid *f, const silt_step *s, bool fresh, silt_error *err) {
+    bool done;
+    if (fresh)
+        SILT_CLOCKED(analyse, silt_factor_analyse(&system->factor, FACTOR_DEFINITE, NULL));
+    SILT_CLOCKED(factor, done = silt_factor_compute(&system->factor));
+    if (done)
+        return SILT_OK;
+    const double *x = s->nodes->x + f->dim * system->factor.bad;
+    system->revision = -1;
+    return silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite near (%g, %g)", x[0], x[1]);
 }
 
 // 3/(4 mu) of the lumped mass and the stabilisation: what is left of the pressure's operator when viscosity outweighs inertia
@@ -273,7 +236,7 @@ static silt_status system_factor(silt_pressure *p, silt_system *system, const si
 static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
     silt_system *system = &p->stiff;
-    const bool fresh = system->revision != mesh->revision || !system->matrix;
+    const bool fresh = system->revision != mesh->revision || !system->factor.inside;
     if (fresh)
         pattern_build(p, system, mesh, f->dim, true);
     double *fluidity = f->scratch;
@@ -281,8 +244,8 @@ static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step
     for (int e = 0; e < mesh->n_cell; e++)
         for (int a = 0; a <= f->dim; a++)
             fluidity[mesh->cell[e][a]] += 0.75 * f->cell_volume[e] / ((f->dim + 1) * f->mu[e]);
-    const int *start = system->matrix->p, *index = system->matrix->i;
-    double *value = system->matrix->x;
+    const int *start = system->factor.start, *index = system->factor.index;
+    double *value = system->factor.value;
     memset(p->row, 0, (size_t)p->n * sizeof *p->row);
     for (int j = 0; j < p->n; j++) {
         column_laplacian(p, f, mesh, j, false);
@@ -293,7 +256,7 @@ static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step
             p->row[mesh->neighbour[k]] = 0;
         p->row[j] = 0;
     }
-    return system_factor(p, system, f, s, fresh, err);
+    return system_factor(system, f, s, fresh, err);
 }
 
 silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
@@ -301,7 +264,7 @@ silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_ste
     const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
     const bool compact = f->dim == 3 || !consistent;
     silt_system *system = &p->main;
-    const bool fresh = system->revision != mesh->revision || !system->matrix || system->compact != compact;
+    const bool fresh = system->revision != mesh->revision || !system->factor.inside || system->compact != compact;
     p->n = mesh->n_node;
     if (fresh) {
         pattern_build(p, system, mesh, f->dim, compact);
@@ -314,8 +277,8 @@ silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_ste
     else if (consistent)
         boundary_diagonal(p, f, mesh);
 
-    const int *start = system->matrix->p, *index = system->matrix->i;
-    double *value = system->matrix->x;
+    const int *start = system->factor.start, *index = system->factor.index;
+    double *value = system->factor.value;
     memset(p->row, 0, (size_t)p->n * sizeof *p->row);
     for (int j = 0; j < p->n; j++) {
         if (mesh->wet[j]) {
@@ -343,16 +306,13 @@ silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_ste
         }
         p->row[j] = 0;
     }
-    SILT_TRY(system_factor(p, system, f, s, fresh, err));
+    SILT_TRY(system_factor(system, f, s, fresh, err));
     return stiff ? factor_stiff(p, f, s, err) : SILT_OK;
 }
 
-static silt_status factor_solve(silt_pressure *p, silt_system *system, const double *right, double *out, silt_error *err) {
-    cholmod_dense b = {.nrow = (size_t)p->n, .ncol = 1, .nzmax = (size_t)p->n, .d = (size_t)p->n, .x = (void *)(uintptr_t)right,
-                       .xtype = CHOLMOD_REAL, .dtype = CHOLMOD_DOUBLE};
-    if (!cholmod_solve2(CHOLMOD_A, system->factor, &b, NULL, &p->solution, NULL, &p->work_y, &p->work_e, &p->common))
-        return silt_fail(err, SILT_FAILED, "the pressure system could not be solved (CHOLMOD status %d)", p->common.status);
-    memcpy(out, p->solution->x, (size_t)p->n * sizeof *out);
+static silt_status factor_solve(silt_system *system, const double *right, double *out, silt_error *err) {
+    if (!silt_factor_solve(&system->factor, right, out))
+        return silt_fail(err, SILT_FAILED, "the pressure system could not be solved (%d nodes)", system->factor.n);
     return SILT_OK;
 }
 
@@ -384,14 +344,14 @@ silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step
                                 double *x, silt_error *err) {
     const int n = p->n;
     if (!p->main.compact || s->scene->fluid.pressure != PRESSURE_CONSISTENT)
-        return factor_solve(p, &p->main, right, x, err);
+        return factor_solve(&p->main, right, x, err);
     for (int k = 0; k < 4; k++)
         SILT_RESERVE(p->cg[k], p->cg_capacity[k], n + 1);
     SILT_RESERVE(p->work, p->work_capacity, f->dim * n + 1);
     double *r = p->cg[0], *z = p->cg[1], *d = p->cg[2], *ad = p->cg[3];
     memcpy(r, right, (size_t)n * sizeof *r);
     memset(x, 0, (size_t)n * sizeof *x);
-    SILT_TRY(factor_solve(p, &p->main, r, z, err));
+    SILT_TRY(factor_solve(&p->main, r, z, err));
     memcpy(d, z, (size_t)n * sizeof *d);
     double rz = dot(n, r, z);
     const double target = silt_square(tolerance) * rz;
@@ -407,7 +367,7 @@ silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step
             x[i] += alpha * d[i];
             r[i] -= alpha * ad[i];
         }
-        SILT_TRY(factor_solve(p, &p->main, r, z, err));
+        SILT_TRY(factor_solve(&p->main, r, z, err));
         const double fresh = dot(n, r, z), beta = fresh / rz;
         for (int i = 0; i < n; i++)
             d[i] = z[i] + beta * d[i];
@@ -418,5 +378,5 @@ silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step
 }
 
 silt_status silt_pressure_solve_stiff(silt_pressure *p, const double *right, double *increment, silt_error *err) {
-    return factor_solve(p, &p->stiff, right, increment, err);
+    return factor_solve(&p->stiff, right, increment, err);
 }

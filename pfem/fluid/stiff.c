@@ -2,27 +2,23 @@
 // its own solver. [A -G; -G^T -L] is symmetric and quasi-definite: every order of elimination has an LDL^T factor
 // (Vanderbei, SIAM J. Optim. 5, 1995).
 // Node by node, the velocities first, with the order of the nodes that suits their graph.
-#include <cholmod.h>
-
+#include "factor.h"
 #include "fluid.h"
 
 /** a symmetric matrix with m unknowns a node and its factor */
 typedef struct silt_blocks {
     int m;
     bool ready;               // the factor is that of the present step
-    cholmod_factor *factor;   // owned
-    cholmod_sparse *matrix;   // owned, lower triangle by columns
+    silt_factor factor;       // owned
 } silt_blocks;
 
 struct silt_stiff {
-    cholmod_common common;
     silt_blocks velocity, saddle; // A; with the pressure
     int64_t revision;             // of the mesh that patterns and factors belong to
     int n;
     double *entry;                // owned, (dim + 1)^2 per neighbour
     double *right;                // owned, dim + 1 per node
     int *closed;                  // owned, per node, group of joined water; then 1: its pressure is pinned
-    cholmod_dense *solution, *work_y, *work_e; // owned
     int entry_capacity, right_capacity, closed_capacity;
 };
 
@@ -34,11 +30,8 @@ void silt_stiff_end(silt_stiff *stiff) {
 void silt_stiff_forget(silt_stiff *stiff) {
     if (!stiff)
         return;
-    silt_blocks *both[2] = {&stiff->velocity, &stiff->saddle};
-    for (int k = 0; k < 2; k++) {
-        cholmod_free_factor(&both[k]->factor, &stiff->common);
-        cholmod_free_sparse(&both[k]->matrix, &stiff->common);
-    }
+    silt_factor_clear(&stiff->velocity.factor);
+    silt_factor_clear(&stiff->saddle.factor);
     stiff->revision = -1;
     silt_stiff_end(stiff);
 }
@@ -48,10 +41,6 @@ void silt_stiff_free(silt_stiff **stiff) {
         return;
     silt_stiff *q = *stiff;
     silt_stiff_forget(q);
-    cholmod_free_dense(&q->solution, &q->common);
-    cholmod_free_dense(&q->work_y, &q->common);
-    cholmod_free_dense(&q->work_e, &q->common);
-    cholmod_finish(&q->common);
     free(q->entry);
     free(q->right);
     free(q->closed);
@@ -64,17 +53,14 @@ bool silt_stiff_ready(const silt_stiff *stiff, bool pressure) {
 }
 
 // pattern of m unknowns a node, and the order of elimination from that of the nodes
-static void pattern(silt_stiff *q, silt_blocks *b, const silt_mesh *mesh, int m, const int *order) {
+static void pattern(silt_blocks *b, const silt_mesh *mesh, int m, const int *order) {
     const int n = mesh->n_node;
     b->m = m;
-    cholmod_free_factor(&b->factor, &q->common);
-    cholmod_free_sparse(&b->matrix, &q->common);
-    size_t filled = 0;
+    int filled = 0;
     for (int j = 0; j < n; j++)
         for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
-            filled += (size_t)(mesh->neighbour[k] > j ? m * m : mesh->neighbour[k] == j ? m * (m + 1) / 2 : 0);
-    b->matrix = cholmod_allocate_sparse((size_t)(m * n), (size_t)(m * n), filled, 1, 1, -1, CHOLMOD_REAL, &q->common);
-    int *start = b->matrix->p, *index = b->matrix->i, at = 0;
+            filled += mesh->neighbour[k] > j ? m * m : mesh->neighbour[k] == j ? m * (m + 1) / 2 : 0;
+    int *start = silt_factor_pattern(&b->factor, m * n, filled), *index = b->factor.index, at = 0;
     for (int j = 0; j < n; j++)
         for (int c = 0; c < m; c++) {
             start[m * j + c] = at;
@@ -89,22 +75,15 @@ static void pattern(silt_stiff *q, silt_blocks *b, const silt_mesh *mesh, int m,
     for (int k = 0; k < n; k++)
         for (int c = 0; c < m; c++)
             perm[m * k + c] = m * order[k] + c;
-    // supernodes are for positive definite matrices only
-    q->common.supernodal = m == 2 ? CHOLMOD_AUTO : CHOLMOD_SIMPLICIAL;
-    b->factor = cholmod_analyze_p(b->matrix, perm, NULL, 0, &q->common);
+    SILT_CLOCKED(analyse, silt_factor_analyse(&b->factor, m == 2 ? FACTOR_DEFINITE : FACTOR_QUASI_DEFINITE, perm));
     free(perm);
 }
 
 // order of the nodes by minimum degree
-static int *node_order(silt_stiff *q, const silt_mesh *mesh) {
+static int *node_order(const silt_mesh *mesh) {
     const int n = mesh->n_node;
-    size_t filled = 0;
-    for (int j = 0; j < n; j++)
-        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
-            filled += mesh->neighbour[k] >= j;
-    cholmod_sparse *graph = cholmod_allocate_sparse((size_t)n, (size_t)n, filled, 1, 1, -1, CHOLMOD_PATTERN,
-                                                    &q->common);
-    int *start = graph->p, *index = graph->i, at = 0;
+    int *start = silt_alloc((size_t)n + 1, sizeof *start), *index = silt_alloc((size_t)mesh->neighbour_start[n] + 1, sizeof *index);
+    int at = 0;
     for (int j = 0; j < n; j++) {
         start[j] = at;
         for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
@@ -112,11 +91,10 @@ static int *node_order(silt_stiff *q, const silt_mesh *mesh) {
                 index[at++] = mesh->neighbour[k];
     }
     start[n] = at;
-    int *order = silt_alloc((size_t)n + 1, sizeof *order);
-    for (int k = 0; k < n; k++)
-        order[k] = k;
-    cholmod_amd(graph, NULL, 0, order, &q->common);
-    cholmod_free_sparse(&graph, &q->common);
+    int *order;
+    SILT_CLOCKED(analyse, order = silt_factor_order(n, start, index));
+    free(start);
+    free(index);
     return order;
 }
 
@@ -202,7 +180,7 @@ static void hold(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh) {
 
 static void fill(const silt_stiff *q, silt_blocks *b, const silt_mesh *mesh) {
     const int m = b->m;
-    double *value = b->matrix->x;
+    double *value = b->factor.value;
     int at = 0;
     for (int j = 0; j < q->n; j++)
         for (int c = 0; c < m; c++)
@@ -218,12 +196,6 @@ silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const sil
     const silt_mesh *mesh = s->mesh;
     if (!*stiff) {
         *stiff = silt_alloc(1, sizeof **stiff);
-        cholmod_start(&(*stiff)->common);
-        (*stiff)->common.print = 0;
-        (*stiff)->common.nmethods = 1;
-        (*stiff)->common.method[0].ordering = CHOLMOD_GIVEN;
-        (*stiff)->common.postorder = 1;
-        (*stiff)->common.quick_return_if_not_posdef = 1;
         (*stiff)->revision = -1;
     }
     silt_stiff *q = *stiff;
@@ -232,10 +204,10 @@ silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const sil
     q->n = mesh->n_node;
     SILT_RESERVE(q->entry, q->entry_capacity, 9 * mesh->neighbour_start[q->n] + 1);
     SILT_RESERVE(q->right, q->right_capacity, 3 * q->n + 1);
-    if (q->revision != mesh->revision || !q->velocity.matrix) {
-        int *order = node_order(q, mesh);
-        pattern(q, &q->velocity, mesh, 2, order);
-        pattern(q, &q->saddle, mesh, 3, order);
+    if (q->revision != mesh->revision || !q->velocity.factor.inside) {
+        int *order = node_order(mesh);
+        pattern(&q->velocity, mesh, 2, order);
+        pattern(&q->saddle, mesh, 3, order);
         free(order);
         find_closed(q, mesh);
         q->revision = mesh->revision;
@@ -243,7 +215,9 @@ silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const sil
     assemble(q, f, mesh);
     hold(q, f, mesh);
     fill(q, b, mesh);
-    if (!b->factor || !silt_factorize(b->matrix, b->factor, &q->common) || q->common.status == CHOLMOD_NOT_POSDEF) {
+    bool done;
+    SILT_CLOCKED(factor, done = silt_factor_compute(&b->factor));
+    if (!done) {
         q->revision = -1;
         return silt_fail(err, SILT_FAILED, "the %s matrix of the stiff water could not be factored",
                          pressure ? "saddle-point" : "momentum");
@@ -252,20 +226,15 @@ silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const sil
     return SILT_OK;
 }
 
-static silt_status solve(silt_stiff *q, silt_blocks *b, double *right, silt_error *err) {
-    const size_t n = (size_t)(b->m * q->n);
-    cholmod_dense in = {.nrow = n, .ncol = 1, .nzmax = n, .d = n, .x = right, .xtype = CHOLMOD_REAL,
-                        .dtype = CHOLMOD_DOUBLE};
-    if (!cholmod_solve2(CHOLMOD_A, b->factor, &in, NULL, &q->solution, NULL, &q->work_y, &q->work_e, &q->common))
-        return silt_fail(err, SILT_FAILED, "the stiff water's system could not be solved (CHOLMOD status %d)",
-                         q->common.status);
-    memcpy(right, q->solution->x, n * sizeof *right);
+static silt_status solve(silt_blocks *b, double *right, silt_error *err) {
+    if (!silt_factor_solve(&b->factor, right, right))
+        return silt_fail(err, SILT_FAILED, "the stiff water's system could not be solved (%d unknowns)", b->factor.n);
     return SILT_OK;
 }
 
 silt_status silt_stiff_momentum(silt_stiff *q, const silt_fluid *f, const double *right, double *out, silt_error *err) {
     memcpy(out, right, (size_t)(2 * q->n) * sizeof *out);
-    SILT_TRY(solve(q, &q->velocity, out, err));
+    SILT_TRY(solve(&q->velocity, out, err));
     for (int i = 0; i < q->n; i++)
         silt_hold_project(f, i, out + 2 * i);
     return SILT_OK;
@@ -277,7 +246,7 @@ silt_status silt_stiff_correct(silt_stiff *q, const silt_fluid *f, const double 
         q->right[3 * i] = q->right[3 * i + 1] = 0;
         q->right[3 * i + 2] = -right[i];
     }
-    SILT_TRY(solve(q, &q->saddle, q->right, err));
+    SILT_TRY(solve(&q->saddle, q->right, err));
     for (int i = 0; i < q->n; i++) {
         double dv[3] = {q->right[3 * i], q->right[3 * i + 1], 0};
         silt_hold_project(f, i, dv);

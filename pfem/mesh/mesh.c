@@ -108,15 +108,18 @@ static bool facet_on_plane(const silt_mesh *mesh, const silt_nodes *nodes, int i
 
 silt_facet_kind silt_facet_kind_of(const silt_mesh *mesh, const silt_nodes *nodes, const int facet[3]) {
     const int dim = mesh->dim == 3 ? 3 : 2;
-    int n_inlet = 0, n_bed = 0, n_body = 0;
+    int n_inlet = 0, n_open = 0, n_bed = 0, n_body = 0;
     for (int k = 0; k < dim; k++) {
         const int i = facet[k];
         n_inlet += nodes->kind[i] == NODE_INLET;
+        n_open += nodes->kind[i] == NODE_OPEN && nodes->owner[i] == nodes->owner[facet[0]];
         n_bed += nodes->kind[i] == NODE_BED;
         n_body += nodes->kind[i] == NODE_BODY && nodes->owner[i] == nodes->owner[facet[0]];
     }
     if (n_inlet == dim)
         return FACET_INLET;
+    if (n_open == dim)
+        return FACET_OPEN;
     if (n_bed == dim)
         return FACET_BED;
     if (n_body == dim)
@@ -138,10 +141,15 @@ silt_facet_kind silt_facet_kind_of(const silt_mesh *mesh, const silt_nodes *node
         return FACET_WALL;
     if (!silt_mesh_share(mesh, nodes, n_other, other))
         return FACET_FREE;
-    for (int k = 0; k < n_fixed; k++)
-        if (!facet_on_plane(mesh, nodes, fixed[k], other[0], nodes->wall[other[0]][0]))
-            return FACET_FREE;
-    return FACET_WALL;
+    // an inlet's rim may lie in the second wall of a crease
+    for (int s = 0; s < (n_inlet ? 3 : 1) && nodes->wall[other[0]][s] >= 0; s++) {
+        bool all = true;
+        for (int k = 0; k < n_fixed && all; k++)
+            all = facet_on_plane(mesh, nodes, fixed[k], other[0], nodes->wall[other[0]][s]);
+        if (all)
+            return FACET_WALL;
+    }
+    return FACET_FREE;
 }
 
 bool silt_mesh_share(const silt_mesh *mesh, const silt_nodes *nodes, int n, const int *node) {

@@ -8,6 +8,7 @@
 #define REFINE_SURFACE 0.35 // this: the surface's shape hangs on them; up to the former where the surface is so flat that
 #define REFINE_SHAPE 0.01   // less than this times h^dim comes or goes with the node
 #define REFINE_FLAT 0.25    // a node nearer to a wall than this times h is pressed out
+#define REFINE_SMOOTH 0.7   // cosine of the largest bend of the free surface over which a cubic is laid
 #define REFINE_UNDER 0.1    // in space a node from within nearer than this times h to the free surface: slivers would follow, and go
 #define REFINE_CREASE 1.5   // edges along creases that are longer than this times h get nodes
 #define REFINE_ROOM 0.6     // but no node comes inside nearer than this times h to another
@@ -85,6 +86,7 @@ typedef struct refinement {
     const silt_walls *walls;
     int dim;
     double h; // fluid.size
+    bool fed; // in space: water comes in or leaves through openings that have nodes
     uint8_t *locked, *long_edge; // one per node: has an edge that may be too long
     int *facet_start, *facet; // boundary facets of every node
     candidate *list;
@@ -127,11 +129,13 @@ static void refine_remove(refinement *r, int i) {
 
 // how dear a node is: the dearer of two crowded ones stays; from 8 on none leaves
 static int refine_rank(const refinement *r, int i) {
-    if (r->nodes->kind[i] != NODE_FLUID)
-        return 9;
     int n_wall = 0;
     for (int s = 0; s < 3; s++)
         n_wall += r->nodes->wall[i][s] >= 0;
+    if (r->nodes->kind[i] == NODE_OPEN)
+        return n_wall >= r->dim - 1 ? 9 : r->mesh->surface[i] ? 7 : 5 + n_wall;
+    if (r->nodes->kind[i] != NODE_FLUID)
+        return 9;
     if (n_wall >= r->dim)
         return 8; // fills a corner
     return (n_wall == 2 ? 4 : n_wall) + (r->mesh->surface[i] ? 2 : 0);
@@ -440,10 +444,51 @@ static bool refine_along_wedge(const refinement *r, int a, int b) {
     return r->dim == 2 && (both || refine_walls(r, a, b, wall) > 0);
 }
 
+// way from node a to the node before it on the free surface, seen from b. @return its length, 0: there is none
+static double refine_before(const refinement *r, int a, int b, int *node, double way[3]) {
+    int before = -1;
+    for (int k = r->facet_start[a]; k < r->facet_start[a + 1]; k++) {
+        const int *facet = r->mesh->facet[r->facet[k]], j = facet[0] == a ? facet[1] : facet[0];
+        if (r->mesh->facet_kind[r->facet[k]] != FACET_FREE || (j != b && before >= 0))
+            return 0;
+        before = j != b ? j : before;
+    }
+    if (before < 0)
+        return 0;
+    refine_apart(r, a, r->nodes->x + 2 * before, way);
+    *node = before;
+    return hypot(way[0], way[1]);
+}
+
+// A node that comes on the free surface, in 2-D, lies on the cubic through the edge's ends and their neighbours. On the chord it
+// would be a dent, and a surface that is accelerated towards the water tears open from dents. Its velocity likewise: more is what
+// it has beyond that of the edge.
+static void refine_bend(const refinement *r, int a, int b, double share, double x[3], double more[3]) {
+    double d[3], u[3], w[3];
+    int p = -1, q = -1;
+    refine_apart(r, a, r->nodes->x + 2 * b, d);
+    const double length = hypot(d[0], d[1]), before = refine_before(r, a, b, &p, u), after = refine_before(r, b, a, &q, w);
+    if (before < 0.2 * length || after < 0.2 * length || u[0] * d[0] + u[1] * d[1] > -REFINE_SMOOTH * before * length ||
+        w[0] * d[0] + w[1] * d[1] < REFINE_SMOOTH * after * length)
+        return;
+    // heights of the neighbours over the chord; their shares by Lagrange in the length along the four points
+    const double n[2] = {-d[1] / length, d[0] / length}, t = share * length, end = length + after;
+    const double first = t * (t - length) * (t - end) / (-before * (before + length) * (before + end));
+    const double last = (t + before) * t * (t - length) / ((end + before) * end * after);
+    const double height = first * (u[0] * n[0] + u[1] * n[1]) + last * (w[0] * n[0] + w[1] * n[1]);
+    const double off = silt_clamp(height, -0.15 * length, 0.15 * length), *v = r->nodes->v;
+    for (int c = 0; c < 2; c++) {
+        const double slope = (v[2 * b + c] - v[2 * a + c]) / length;
+        more[c] = first * (v[2 * p + c] - v[2 * a + c] + slope * before) + last * (v[2 * q + c] - v[2 * b + c] - slope * after);
+    }
+    x[0] += off * n[0];
+    x[1] += off * n[1];
+}
+
 static void refine_insert(refinement *r, int a, int b, double share, bool closed, const int *around, int n_around) {
     silt_nodes *nodes = r->nodes;
     const int dim = r->dim;
-    double d[3], x[3] = {0};
+    double d[3], x[3] = {0}, more[3] = {0};
     int wall[3];
     refine_apart(r, a, nodes->x + dim * b, d);
     for (int c = 0; c < dim; c++)
@@ -452,6 +497,8 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
     const int n_wall = closed ? 0 : refine_walls(r, a, b, wall);
     if (n_wall)
         refine_onto(r, n_wall, wall, x);
+    else if (dim == 2 && !closed)
+        refine_bend(r, a, b, share, x, more);
     const double h = refine_h(r, a, b);
     const bool surface = !closed && r->mesh->surface[a] && r->mesh->surface[b], wedge = !closed && refine_along_wedge(r, a, b);
     const int rank = (n_wall >= 2 ? 4 : n_wall) + (surface ? 2 : 0);
@@ -460,16 +507,19 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
         return;
     if (!refine_has_room(r, a, b, x, (closed ? REFINE_ROOM : refine_rim[dim]) * h, rank, h, wedge))
         return;
-    const int i = silt_nodes_add(nodes, NODE_FLUID, -1, x);
+    const bool open = !closed && nodes->kind[a] == NODE_OPEN && nodes->kind[b] == NODE_OPEN && nodes->owner[a] == nodes->owner[b];
+    const int i = silt_nodes_add(nodes, open ? NODE_OPEN : NODE_FLUID, open ? nodes->owner[a] : -1, x);
     for (int c = 0; c < dim; c++)
-        nodes->v[dim * i + c] = (1 - share) * nodes->v[dim * a + c] + share * nodes->v[dim * b + c];
+        nodes->v[dim * i + c] = (1 - share) * nodes->v[dim * a + c] + share * nodes->v[dim * b + c] + more[c];
     nodes->p[i] = (1 - share) * nodes->p[a] + share * nodes->p[b];
     if (nodes->h)
         nodes->h[i] = (1 - share) * silt_node_h(nodes, a, r->h) + share * silt_node_h(nodes, b, r->h);
     for (int s = 0; s < n_wall; s++)
         nodes->wall[i][s] = wall[s];
     silt_memory_extend(r->memory, nodes->count);
-    r->memory->interior[i] = closed;
+    // on a wall in space the edge's ends say it: nothing is free around it. Where openings stretch the cells on walls these would
+    // go otherwise, and leave dents
+    r->memory->interior[i] = closed || (r->fed && (n_wall || open) && r->memory->interior[a] && r->memory->interior[b]);
     for (int k = 0; k < n_around; k++)
         for (int c = 0; c <= dim; c++) {
             const int j = r->mesh->cell[around[k]][c];
@@ -564,8 +614,8 @@ static void refine_stretched(refinement *r) {
         const int a = r->list[c].a, b = r->list[c].b;
         if (c && r->list[c - 1].a == a && r->list[c - 1].b == b)
             continue;
-        // bed, bodies and inlets keep their own nodes
-        if (nodes->kind[a] != NODE_FLUID && nodes->kind[a] == nodes->kind[b])
+        // bed, bodies and inlets keep their own nodes; openings with a level do not
+        if (nodes->kind[a] != NODE_FLUID && nodes->kind[a] != NODE_OPEN && nodes->kind[a] == nodes->kind[b])
             continue;
         int around[64];
         bool closed, locked = false;
@@ -595,8 +645,10 @@ void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *mem
     refinement r = {.mesh = mesh, .nodes = nodes, .memory = memory, .walls = mesh->walls, .dim = silt_nodes_dim(nodes), .h = h};
     r.locked = silt_alloc((size_t)mesh->n_node + 1, 1);
     r.long_edge = silt_alloc((size_t)mesh->n_node + 1, 1);
-    for (int i = 0; i < mesh->n_node; i++)
+    for (int i = 0; i < mesh->n_node; i++) {
         r.locked[i] = memory->dead[i];
+        r.fed |= r.dim == 3 && (nodes->kind[i] == NODE_INLET || nodes->kind[i] == NODE_OPEN);
+    }
     refine_facets(&r);
     refine_crowded(&r);
     refine_flat(&r);

@@ -89,7 +89,20 @@ void silt_cell_set_clear(silt_cell_set *set) {
 // nodes all on one patch of the walls make no cell where they lie flat on it
 static bool cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const silt_cell_shape *shape,
                          double h) {
-    return silt_mesh_share(mesh, nodes, mesh->dim + 1, cell) && shape->height < CELL_FLAT * h;
+    if (shape->height >= CELL_FLAT * h)
+        return false;
+    if (silt_mesh_share(mesh, nodes, mesh->dim + 1, cell))
+        return true;
+    // in space also between nodes of an opening, and of the wall around it
+    bool opening = false, free_facet = false;
+    for (int a = 0; a < 4 && mesh->dim == 3; a++)
+        opening |= nodes->kind[cell[a]] == NODE_INLET || nodes->kind[cell[a]] == NODE_OPEN;
+    for (int a = 0; a < 4 && opening && !free_facet; a++) {
+        int facet[3];
+        silt_cell_facet(3, cell, a, facet);
+        free_facet = silt_facet_kind_of(mesh, nodes, facet) == FACET_FREE;
+    }
+    return opening && !free_facet;
 }
 
 static int cell_count_free(const silt_nodes *nodes, int n_corner, const int *cell) {
@@ -569,7 +582,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
             double weight[4];
             int n_fluid = 0, n_inner = 0;
             for (int a = 0; a <= dim; a++) {
-                n_fluid += nodes->kind[cell[a]] == NODE_FLUID || nodes->kind[cell[a]] == NODE_INLET;
+                n_fluid += nodes->kind[cell[a]] == NODE_FLUID || nodes->kind[cell[a]] == NODE_INLET || nodes->kind[cell[a]] == NODE_OPEN;
                 n_inner += memory->interior[cell[a]];
             }
             // in space a gap is between surfaces: a node from within has none to close

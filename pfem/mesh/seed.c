@@ -77,6 +77,19 @@ static void seed_wrap(const seed *s, double *x) {
         x[0] = s->scene->period[0];
 }
 
+// a node on an opening: of prescribed velocity, or with a level behind it, which knows the walls beside it
+static void seed_opening(seed *s, int opening, const double *x) {
+    const silt_opening o = silt_opening_of(s->scene, opening);
+    double on[3], at[3] = {0};
+    memcpy(at, x, (size_t)s->dim * sizeof *at);
+    const double height = silt_opening_height(&o, at);
+    for (int d = 0; d < s->dim; d++)
+        at[d] -= height * o.normal[d];
+    const int k = seed_add(s, o.level ? NODE_OPEN : NODE_INLET, opening, at);
+    if (o.level && s->walls->count)
+        silt_walls_touching(s->walls, at, 1e-3 * s->h, s->nodes->wall[k], on);
+}
+
 // a node on the tank's wall knows its elements; closer than a thousandth of h counts as on
 void seed_water(seed *s, const double *x, double gap, double margin) {
     double on[3] = {0}, at[3] = {0};
@@ -92,8 +105,13 @@ void seed_water(seed *s, const double *x, double gap, double margin) {
         return;
     if (seed_crowded(s, on, gap))
         return;
-    const int k = seed_add(s, NODE_FLUID, -1, on);
-    memcpy(s->nodes->wall[k], wall, sizeof wall);
+    const int opening = silt_opening_on(s->scene, on, 1e-3 * s->h, s->dim == 3);
+    if (opening >= 0)
+        seed_opening(s, opening, on);
+    else {
+        const int k = seed_add(s, NODE_FLUID, -1, on);
+        memcpy(s->nodes->wall[k], wall, sizeof wall);
+    }
 }
 
 // the outline of a region as points
@@ -207,6 +225,8 @@ static void seed_region(seed *s, int r, const double lo[2], const double hi[2]) 
 static void seed_inlets(seed *s) {
     for (int k = 0; k < s->scene->fluid.n_inlet && s->dim == 2; k++) {
         const silt_inlet *inlet = &s->scene->fluid.inlet[k];
+        if (inlet->drive == INLET_HEAD)
+            continue; // see seed_rims
         const double length = hypot(inlet->to[0] - inlet->from[0], inlet->to[1] - inlet->from[1]);
         double h = s->h;
         for (int m = 0; m <= 8 && s->size; m++) {
@@ -222,6 +242,95 @@ static void seed_inlets(seed *s) {
                 continue;
             seed_add(s, NODE_INLET, k, x);
         }
+    }
+}
+
+// true when there is water before the opening at the share t of its edge from p to q
+static bool seed_wet(const seed *s, const silt_opening *o, const double *p, const double *q, double t) {
+    double x[3] = {0}, in[3] = {0};
+    const double off = 1e-7 * o->size;
+    for (int d = 0; d < s->dim; d++)
+        x[d] = p[d] + t * (q[d] - p[d]) + off * o->normal[d];
+    // off the edge into the opening: a rim may stand on a wall
+    for (int d = 0; d < 3 && s->dim == 3; d++) {
+        const int e = (d + 1) % 3, f = (d + 2) % 3;
+        in[d] = o->normal[e] * (q[f] - p[f]) - o->normal[f] * (q[e] - p[e]);
+    }
+    const double length = silt_length(3, in);
+    for (int d = 0; d < 3 && length > 0; d++)
+        x[d] += off * in[d] / length;
+    for (int r = 0; r < s->scene->fluid.n_region; r++)
+        if (silt_region_contains(&s->scene->fluid.region[r], x))
+            return true;
+    return false;
+}
+
+// nodes at spacing h on a part of an edge of an opening's rim
+static void seed_rim_part(seed *s, int opening, const double *p, const double *q, double from, double to) {
+    double length = 0;
+    for (int d = 0; d < s->dim; d++)
+        length = hypot(length, (to - from) * (q[d] - p[d]));
+    const int pieces = s->dim == 3 ? (int)silt_max(1, floor(length / s->h + 0.5)) : 1;
+    for (int m = 0; m <= pieces; m++) {
+        double x[3] = {0};
+        const double t = m == pieces ? to : from + (to - from) * m / pieces;
+        for (int d = 0; d < s->dim; d++)
+            x[d] = t == 1 ? q[d] : p[d] + (q[d] - p[d]) * t;
+        if (!seed_crowded(s, x, 1e-3 * s->h))
+            seed_opening(s, opening, x);
+    }
+}
+
+// The rims of openings with a level and of all openings in space, before the water's outline gives them their other nodes. Where
+// no water stands an opening with a level has none.
+static void seed_rims(seed *s) {
+    enum { SAMPLES = 256 };
+    for (int k = 0; k < silt_opening_count(s->scene); k++) {
+        const silt_opening o = silt_opening_of(s->scene, k);
+        const int n = s->dim == 3 ? o.n_corner : 1;
+        for (int c = 0; c < n && (o.level || (o.inlet && s->dim == 3)); c++) {
+            const double *p = s->dim == 3 ? o.corner + 3 * c : o.from, *q = s->dim == 3 ? o.corner + 3 * ((c + 1) % n) : o.to;
+            double from = 0;
+            bool before = false;
+            for (int m = 0; m <= SAMPLES; m++) {
+                // the ends themselves lie on walls, water may begin a hair inside of them
+                const double t = silt_clamp((double)m / SAMPLES, 1e-6, 1 - 1e-6);
+                const bool wet = !o.level || seed_wet(s, &o, p, q, t);
+                double low = (m - 1.0) / SAMPLES, high = t;
+                for (int half = 0; half < 60 && m && wet != before; half++) {
+                    const double middle = 0.5 * (low + high);
+                    *(seed_wet(s, &o, p, q, middle) == before ? &low : &high) = middle;
+                }
+                if (wet && !before)
+                    from = m ? high : 0;
+                else if (!wet && before)
+                    seed_rim_part(s, k, p, q, from, low);
+                if (wet && m == SAMPLES)
+                    seed_rim_part(s, k, p, q, from, 1);
+                before = wet;
+            }
+        }
+    }
+}
+
+// in space: what no water stands before yet of an inlet with a prescribed velocity
+static void seed_dry_inlets(seed *s) {
+    for (int k = 0; k < s->scene->fluid.n_inlet && s->dim == 3; k++) {
+        const silt_opening o = silt_opening_of(s->scene, k);
+        double u[3], v[3], length = 0;
+        for (int d = 0; d < 3; d++)
+            length = hypot(length, u[d] = o.corner[3 + d] - o.corner[d]);
+        for (int d = 0; d < 3; d++)
+            v[d] = (o.normal[(d + 1) % 3] * u[(d + 2) % 3] - o.normal[(d + 2) % 3] * u[(d + 1) % 3]) / length;
+        const int n = (int)ceil(o.size / s->h) + 1;
+        for (int j = -n; j <= n && !o.level; j++)
+            for (int i = -n; i <= n; i++) {
+                double x[3];
+                for (int d = 0; d < 3; d++)
+                    x[d] = o.corner[d] + (i + 0.5 * (j & 1)) * s->h * u[d] / length + j * s->h * sqrt(0.75) * v[d];
+                if (silt_opening_depth(&o, x) > 0.5 * s->h && !seed_crowded(s, x, 0.75 * s->h))
+                    seed_opening(s, k, x);
+            }
     }
 }
 
@@ -349,6 +458,7 @@ void silt_nodes_seed(silt_nodes *nodes, const silt_scene *scene, const silt_wall
         return;
     // fixed things first, then outlines, then the inside
     seed_inlets(&s);
+    seed_rims(&s);
     seed_corners(&s);
     if (s.dim == 3 || s.size) {
         for (int r = 0; r < fluid->n_region; r++)
@@ -375,6 +485,7 @@ void silt_nodes_seed(silt_nodes *nodes, const silt_scene *scene, const silt_wall
             free(outline[r]);
         }
     }
+    seed_dry_inlets(&s);
     seed_velocity(&s, 0);
     seed_sizes(&s);
     seed_end(&s);
@@ -432,8 +543,13 @@ static silt_status cloud_take(seed *s, const silt_series *table, silt_error *err
                                    table->line[row_of[other - first]]);
             continue; // inlets, corners, bed and bodies have their own nodes
         }
-        const int k = seed_add(s, NODE_FLUID, -1, on);
-        memcpy(s->nodes->wall[k], wall, sizeof wall);
+        const int opening = silt_opening_on(s->scene, on, 1e-3 * s->h, s->dim == 3), k = s->nodes->count;
+        if (opening >= 0)
+            seed_opening(s, opening, on);
+        else {
+            seed_add(s, NODE_FLUID, -1, on);
+            memcpy(s->nodes->wall[k], wall, sizeof wall);
+        }
         row_of[k - first] = row;
     }
     if (status == SILT_OK) {
@@ -455,6 +571,7 @@ silt_status silt_nodes_read(silt_nodes *nodes, const silt_scene *scene, const si
     silt_status status = SILT_OK;
     if (seed_start(&s, nodes, scene, walls, solid, context)) {
         seed_inlets(&s);
+        seed_rims(&s);
         seed_corners(&s);
         status = cloud_take(&s, &table, err);
     } else

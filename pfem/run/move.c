@@ -132,13 +132,10 @@ static void let_out(silt_run *run) {
         bool gone = false;
         for (int d = 0; d < D; d++)
             gone |= (run->mesh.period[d] <= 0 && (x[d] < run->box_lo[d] || x[d] > run->box_hi[d])) || !isfinite(x[d]);
-        for (int k = 0; D == 2 && k < run->scene->fluid.n_outlet && !gone; k++) {
-            const silt_outlet *outlet = &run->scene->fluid.outlet[k];
-            const double dx = outlet->to[0] - outlet->from[0], dy = outlet->to[1] - outlet->from[1];
-            const double side = dx * (x[1] - outlet->from[1]) - dy * (x[0] - outlet->from[0]);
-            const double before = dx * (old[1] - outlet->from[1]) - dy * (old[0] - outlet->from[0]);
-            const double along = (dx * (x[0] - outlet->from[0]) + dy * (x[1] - outlet->from[1])) / (dx * dx + dy * dy);
-            gone = side < 0 && before >= -1e-12 * (dx * dx + dy * dy) && along > -0.05 && along < 1.05;
+        for (int k = run->scene->fluid.n_inlet; k < silt_opening_count(run->scene) && !gone; k++) {
+            const silt_opening outlet = silt_opening_of(run->scene, k);
+            gone = silt_opening_height(&outlet, x) < 0 && silt_opening_height(&outlet, old) >= -1e-12 * outlet.size &&
+                   silt_opening_depth(&outlet, x) > -0.05 * outlet.size;
         }
         if (gone)
             run->memory.dead[i] = NODE_LEFT;
@@ -255,6 +252,15 @@ static void remember_bed(silt_run *run) {
             run->bed.fluid_node[k] = -1; // water now
 }
 
+// In a central force field it is the pressure with the potential that is smooth: that is what nodes that come get the mean of.
+static void potential_add(silt_run *run, double sign) {
+    const silt_fluid_def *fluid = &run->scene->fluid;
+    silt_nodes *nodes = &run->nodes;
+    if (fluid->force.kind == FORMULA_CENTRAL)
+        for (int i = 0; i < nodes->count; i++)
+            nodes->p[i] += sign * fluid->density * silt_formula_potential(&fluid->force, nodes->x + silt_nodes_dim(nodes) * i);
+}
+
 silt_status silt_run_move(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     silt_nodes *nodes = &run->nodes;
@@ -277,13 +283,16 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
             memcpy(nodes->x + D * i, run->x_old + D * i, (size_t)D * sizeof(double));
     const double fed = silt_mesh_volume(mesh, nodes->x);
     run->ledger.inflow_mass += rho * (fed - moved);
+    silt_run_levels(run);
     run->ledger.volume_solved += run->fluid.solved_volume;
     run->ledger.volume_given += run->fluid.given_back;
     run->ledger.volume_moved += moved - before - run->fluid.solved_volume - run->fluid.given_back;
     if (scene->fluid.air_pressure > 0)
         silt_pockets_advance(&run->pockets, scene, mesh, run->x_old, nodes->x);
+    potential_add(run, 1);
     silt_nodes_shuffle(nodes, mesh, scene, run->step);
     silt_memory_take(&run->memory, mesh, nodes);
+    silt_run_levels_thin(run);
 
     // from here on positions are mended: what that does to the volume is booked by the rebuild
     for (int i = 0; i < n; i++) {
@@ -323,6 +332,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     memcpy(run->debt_before, nodes->debt, (size_t)nodes->count * sizeof(double));
     run->memory.record = true;
     SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
+    potential_add(run, -1);
     double lost[3];
     SILT_CLOCKED(handover,
                  silt_momentum_hand_on(&run->memory, mesh, nodes, rho, NULL, run->debt_before, run->v_before, run->map, lost));

@@ -118,6 +118,13 @@ void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def);
 silt_status silt_run_move(silt_run *run, silt_error *err);
 /** gravity and body force at a place (dim numbers), m/s2 */
 void silt_run_acceleration(const silt_run *run, const double *x, double a[3]);
+// level.c ---------------------------------------------------------------------------------------------
+/** After the water has moved: nodes on openings with a level back onto them, those that came through with them; what passed goes
+ * to the ledger, in or out. */
+void silt_run_levels(silt_run *run);
+/** takes out what stands too close on an opening, or dry; after the memory was taken */
+void silt_run_levels_thin(silt_run *run);
+
 /** velocity of inlets and bodies for the step that begins */
 void silt_run_prescribe(silt_run *run);
 

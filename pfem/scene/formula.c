@@ -490,6 +490,13 @@ void silt_formula_velocity(const silt_formula *formula, double g, const double *
     formula_add(formula, v);
 }
 
+double silt_formula_potential(const silt_formula *formula, const double *x) {
+    double square = 0;
+    for (int k = 0; k < field_dim(formula); k++)
+        square += k + 1 == formula->axis ? 0 : silt_square(x[k] - formula->centre[k]);
+    return 0.5 * formula->rate * fabs(formula->rate) * square;
+}
+
 void silt_formula_acceleration(const silt_formula *formula, double time, const double *x, double *a) {
     const int dim = field_dim(formula);
     a[0] = a[1] = a[2] = 0;

@@ -58,21 +58,27 @@ typedef struct silt_wall {
 
 /** what drives the water in: exactly one is given in a scene */
 typedef enum { INLET_VELOCITY = 1, INLET_HEAD } silt_inlet_drive;
-/** water fed in through the segment from-to (water on its left) */
+/** water fed in through the segment from-to (water on its left), in 3-D through a flat, convex polygon (counter-clockwise as the
+ * water sees it) */
 typedef struct silt_inlet {
     char *name;
     silt_inlet_drive drive; // 0 counts as INLET_VELOCITY
     double from[3], to[3];
+    int n_corner;
+    double *corner;      // owned, 3 per point
     double velocity[3];  // m/s; multiplied by column 1 of the series when there is one
     silt_series series;  // n_row 0: constant; in the scene the name of a CSV file
-    silt_series head;    // water level over time (time, level), m: pressure-driven; n_row 0: velocity-driven
+    silt_series head;    // level over time (time, level), m, of still water behind it; n_row 0: velocity-driven
 } silt_inlet;
 
-/** nodes and grains that cross the segment from-to from left to right leave and are counted */
+/** nodes and grains that cross the segment from-to from left to right leave and are counted; in 3-D the polygon from the side that
+ * sees it counter-clockwise */
 typedef struct silt_outlet {
     char *name;
     double from[3], to[3];
-    double level; // m, water level kept behind it; NaN: free outfall
+    int n_corner;
+    double *corner;    // owned, 3 per point
+    silt_series level; // level over time (time, level), m, of the water behind it; n_row 0: free outfall
 } silt_outlet;
 
 typedef enum {
@@ -342,6 +348,7 @@ double silt_series_at(const silt_series *series, int column, double x);
  * @param base folder that a relative path starts from */
 silt_status silt_series_read(const char *base, const char *path, silt_series *series, silt_error *err);
 void silt_series_clear(silt_series *series);
+void silt_series_constant(silt_series *series, double value); /**< a table of one row: time 0, the value in column 1 */
 int silt_series_column(const silt_series *series, const char *name); /**< column of that name, -1: none */
 /** What silt_series_at needs: two columns or more, finite numbers, column 0 strictly rising. The error names file and line. */
 silt_status silt_series_rising(const silt_series *series, silt_error *err);
@@ -376,6 +383,8 @@ bool silt_chain_crosses(int n, const double *point, bool closed, int crossing[2]
 void silt_formula_velocity(const silt_formula *formula, double g, const double *x, double *v);
 /** Acceleration of a body force at time and x, m/s2; x and a as above. */
 void silt_formula_acceleration(const silt_formula *formula, double time, const double *x, double *a);
+/** m2/s2, potential of a central acceleration at x, without `vector` */
+double silt_formula_potential(const silt_formula *formula, const double *x);
 /** height of the solitary wave's surface over still water at x[0], m */
 double silt_formula_surface(const silt_formula *formula, const double *x);
 /** Does once what every look-up would do anew: sorts the points of FORMULA_FIELD by place, so that a look-up takes
@@ -383,6 +392,28 @@ double silt_formula_surface(const silt_formula *formula, const double *x);
  * @return -1, or the row of a point of the field that stands there twice (it is not sorted then) */
 int silt_formula_prepare(silt_formula *formula);
 void silt_formula_clear(silt_formula *formula); /**< frees series and field */
+
+/** true for the name of a shape that gmsh has to triangulate: .geo, .step, .brep, .iges */
+bool silt_surface_is_shape(const char *path);
+
+/** An inlet or outlet as a place: the outlets count on after the inlets. All borrowed from the scene. */
+typedef struct silt_opening {
+    int dim, n_corner;
+    const double *corner; // 3-D, 3 per point
+    const double *from, *to; // 2-D
+    double normal[3];     // unit, into the water in front of it
+    double size;          // m, its longest extent
+    const silt_series *level; // of still water behind it, NULL: prescribed velocity, or free outfall
+    bool inlet;
+} silt_opening;
+static inline int silt_opening_count(const silt_scene *scene) { return scene->fluid.n_inlet + scene->fluid.n_outlet; }
+silt_opening silt_opening_of(const silt_scene *scene, int k);
+/** signed distance of x (dim numbers) from its plane, positive in front, m */
+double silt_opening_height(const silt_opening *opening, const double *x);
+/** how deep the foot of x in its plane lies within its rim, negative outside, m */
+double silt_opening_depth(const silt_opening *opening, const double *x);
+/** the opening (with a level; velocity too: or a prescribed velocity) whose piece of plane x lies on within `gap`, or -1 */
+int silt_opening_on(const silt_scene *scene, const double *x, double gap, bool velocity);
 
 /** The files that the scene reads, with their folders, in the order of the resolved text; the same file may come twice.
  * @return how many; *file is owned by the caller, the names are the scene's */

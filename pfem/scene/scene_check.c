@@ -45,7 +45,7 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     if (scene->fluid.on && !silt_tree_item(fluid, "regions") && !silt_tree_item(fluid, "inlets") &&
         !silt_tree_item(fluid, "cloud"))
         silt_complain_key(reader, fluid, "key 'fluid.regions': found %s, allowed at least one: there is no water",
-                          scene->dimension == 3 ? "no regions" : "neither regions nor inlets");
+                          "neither regions nor inlets");
     const silt_tree *regions = silt_tree_item(bed, "regions");
     if (regions && regions->kind == TREE_LIST && regions->n_item == 0)
         silt_complain(reader, regions, "key 'bed.regions': found an empty list, allowed at least one region");
@@ -92,10 +92,31 @@ static void check_opening(silt_reader *reader, const char *list, int i, const do
                       list, i, to[0], to[1]);
 }
 
-// openings have two ends and a name of their own
+// the corners of a polygon in space: in one plane, all turning the same way, none twice
+static void check_corners(silt_reader *reader, const silt_scene *scene, int k) {
+    const silt_opening o = silt_opening_of(scene, k);
+    const int i = o.inlet ? k : k - scene->fluid.n_inlet;
+    const char *list = o.inlet ? "inlets" : "outlets";
+    const silt_tree *node = silt_tree_find(reader->root, "fluid.%s.%d.corners", list, i);
+    if (!node || o.n_corner < 3)
+        return;
+    bool flat = true, convex = silt_length(3, o.normal) > 0;
+    for (int c = 0; c < o.n_corner; c++) {
+        const double *p = o.corner + 3 * c, *q = o.corner + 3 * ((c + 1) % o.n_corner);
+        flat &= fabs(silt_opening_height(&o, p)) <= 1e-6 * o.size;
+        convex &= silt_opening_depth(&o, p) >= -1e-9 * o.size && hypot(hypot(q[0] - p[0], q[1] - p[1]), q[2] - p[2]) > 0;
+    }
+    if (!flat || !convex)
+        silt_complain(reader, node, "key 'fluid.%s.%d.corners': found %s, allowed a flat, convex polygon, each corner once", list, i,
+                      flat ? "a polygon that is not convex or has no area" : "corners that do not lie in one plane");
+}
+
+// openings have two ends, or corners, and a name of their own
 static void check_openings(silt_reader *reader, const silt_scene *scene) {
     const silt_fluid_def *fluid = &scene->fluid;
     int n_in = fluid->n_inlet, n = n_in + fluid->n_outlet;
+    for (int i = 0; i < n && scene->dimension == 3; i++)
+        check_corners(reader, scene, i);
     for (int i = 0; i < n_in; i++)
         check_opening(reader, "inlets", i, fluid->inlet[i].from, fluid->inlet[i].to);
     for (int i = 0; i < fluid->n_outlet; i++)

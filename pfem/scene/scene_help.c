@@ -152,6 +152,8 @@ static const char *help_type(const silt_key *key) {
     case KEY_SERIES:
     case KEY_TABLE:
         return "file";
+    case KEY_CURVE:
+        return "number or file";
     case KEY_POINT:
         return "[x, y]";
     case KEY_PLACE:
@@ -166,6 +168,8 @@ static const char *help_type(const silt_key *key) {
     case KEY_CHAIN:
     case KEY_POLYGON:
         return "[[x, y], ...]";
+    case KEY_CORNERS:
+        return "[[x, y, z], ...]";
     case KEY_BLOCK:
         return "block";
     case KEY_LIST:
@@ -189,6 +193,10 @@ char *silt_key_allowed(const silt_key *key, int dimension) {
         fprintf(to, "[x, y, z]");
     } else if (key->kind == KEY_POLYGON && dimension == 3) {
         fprintf(to, "a list of 3 or more points [[x, z], ...]");
+    } else if (key->kind == KEY_CORNERS) {
+        fprintf(to, "a list of 3 or more points [[x, y, z], ...]");
+    } else if (key->kind == KEY_CURVE) {
+        fprintf(to, "a number or a CSV file beside the scene");
     } else if (key->kind == KEY_SEGMENT) {
         fprintf(to, "two different points [[x, y], [x, y]]");
     } else if (key->kind == KEY_CHAIN || key->kind == KEY_POLYGON) {
@@ -207,7 +215,7 @@ char *silt_key_allowed(const silt_key *key, int dimension) {
     } else if (key->kind == KEY_NAME) {
         fprintf(to, "a name of letters, digits and underscores that begins with a letter");
     } else if (key->kind == KEY_SURFACE) {
-        fprintf(to, "an STL or .msh file beside the scene");
+        fprintf(to, "an STL or .msh file beside the scene, or a shape for gmsh");
     } else if (key->kind == KEY_FILE || key->kind == KEY_SERIES || key->kind == KEY_TABLE) {
         fprintf(to, "a CSV file beside the scene");
     } else {

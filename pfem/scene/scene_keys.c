@@ -144,15 +144,19 @@ TABLE(time, "the time block", silt_scene, -1);
 static const silt_key region_rows[] = {REGION_ROWS(silt_region, ), {0}};
 TABLE(region, "a region", silt_region, offsetof(silt_region, kind));
 
+#define CORNERS \
+    "of a flat, convex polygon, in a wall or in the open; counter-clockwise as the water in front of it sees them"
 static const silt_key inlet_rows[] = {
     {"name", KEY_NAME, AT(silt_inlet, name), .doc = "different from all other inlets and outlets"},
-    {"from", KEY_POINT, .unit = "m", AT(silt_inlet, from), .doc = "start of the segment, the water on its left"},
-    {"to", KEY_POINT, .unit = "m", AT(silt_inlet, to), .doc = "end of the segment"},
+    {"from", KEY_POINT, .unit = "m", .flags = KEY_PLANE, AT(silt_inlet, from),
+     .doc = "start of the segment, the water on its left"},
+    {"to", KEY_POINT, .unit = "m", .flags = KEY_PLANE, AT(silt_inlet, to), .doc = "end of the segment"},
+    {"corners", KEY_CORNERS, .unit = "m", .flags = KEY_SPACE, MANY(silt_inlet, n_corner, corner), .doc = CORNERS},
     {"velocity", KEY_POINT, .unit = "m/s", .flags = KEY_CHOICE, .select = INLET_VELOCITY, AT(silt_inlet, velocity),
      .doc = "of the water that comes in"},
-    {"head", KEY_SERIES, .flags = KEY_CHOICE, .select = INLET_HEAD, AT(silt_inlet, head),
-     .doc =
-         "CSV file beside the scene: time in s, water level in m behind the inlet, whose pressure drives the water in"},
+    {"head", KEY_CURVE, .unit = "m", .flags = KEY_CHOICE, .select = INLET_HEAD, AT(silt_inlet, head),
+     .doc = "level of still water behind the inlet, whose pressure drives the water in, less rho u^2/2 for the speed that it comes "
+            "in with: a number, or a CSV file beside the scene with time in s, level in m"},
     {"series", KEY_SERIES, .flags = KEY_OPTIONAL, .when = ONLY(INLET_VELOCITY), AT(silt_inlet, series),
      .doc = "CSV file beside the scene: time in s, factor on the velocity"},
     {0}};
@@ -160,11 +164,13 @@ TABLE(inlet, "an inlet", silt_inlet, offsetof(silt_inlet, drive));
 
 static const silt_key outlet_rows[] = {
     {"name", KEY_NAME, AT(silt_outlet, name), .doc = "different from all other inlets and outlets"},
-    {"from", KEY_POINT, .unit = "m", AT(silt_outlet, from), .doc = "start of the segment"},
-    {"to", KEY_POINT, .unit = "m", AT(silt_outlet, to),
+    {"from", KEY_POINT, .unit = "m", .flags = KEY_PLANE, AT(silt_outlet, from), .doc = "start of the segment"},
+    {"to", KEY_POINT, .unit = "m", .flags = KEY_PLANE, AT(silt_outlet, to),
      .doc = "end of the segment; what crosses it from its left to its right leaves"},
-    {"level", KEY_NUMBER, .unit = "m", .fallback = ".nan", AT(silt_outlet, level),
-     .doc = "water level that is kept behind it; without it the water falls out freely"},
+    {"corners", KEY_CORNERS, .unit = "m", .flags = KEY_SPACE, MANY(silt_outlet, n_corner, corner), .doc = CORNERS},
+    {"level", KEY_CURVE, .unit = "m", .flags = KEY_OPTIONAL, AT(silt_outlet, level),
+     .doc = "of the water behind it, whose pressure acts on it: a number, or a CSV file beside the scene with time in s, level in "
+            "m; without it the water falls out freely"},
     {0}};
 TABLE(outlet, "an outlet", silt_outlet, -1);
 
@@ -296,9 +302,9 @@ static const silt_key fluid_rows[] = {
     {"body_force", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &force_table, .presence = PRESENT_WORD,
      .present = offsetof(silt_fluid_def, force.kind), AT(silt_fluid_def, force),
      .doc = "acceleration of the water besides gravity"},
-    {"inlets", KEY_LIST, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &inlet_table, MANY(silt_fluid_def, n_inlet, inlet),
+    {"inlets", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &inlet_table, MANY(silt_fluid_def, n_inlet, inlet),
      .doc = "where water comes in"},
-    {"outlets", KEY_LIST, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &outlet_table,
+    {"outlets", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &outlet_table,
      MANY(silt_fluid_def, n_outlet, outlet), .doc = "where water and grains leave"},
     {"velocity", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &formula_table, .presence = PRESENT_WORD,
      .present = offsetof(silt_fluid_def, velocity.kind), AT(silt_fluid_def, velocity),
@@ -313,7 +319,8 @@ static const silt_key wall_rows[] = {
     {"box", KEY_BOX, .unit = "m", .flags = KEY_CHOICE, .select = WALL_BOX, AT(silt_wall, lo),
      .doc = "closed box around the water, lower left corner first"},
     {"surface", KEY_SURFACE, .flags = KEY_CHOICE | KEY_SPACE, .select = WALL_SURFACE, AT(silt_wall, surface),
-     .doc = "triangulated surface, normals into the water"},
+     .doc = "triangulated surface, normals into the water: STL or .msh; with libgmsh at the build also .msh of other versions, and "
+            ".geo, .step, .brep, .iges, which it triangulates, normals out of closed shapes"},
     {"closed", KEY_SWITCH, .fallback = "false", .flags = KEY_PLANE, .when = ONLY(WALL_POLYLINE) | ONLY(WALL_BOX),
      AT(silt_wall, closed), .doc = "the last point is joined to the first"},
     {"scale", KEY_NUMBER, .fallback = "1", .flags = KEY_OPEN_LOW | KEY_SPACE, .low = 0, .high = HUGE_VAL,

@@ -23,6 +23,7 @@ typedef enum {
     KEY_SURFACE,    // char *, made absolute, a triangulated surface
     KEY_SERIES,     // silt_series, read from a CSV over rising time
     KEY_TABLE,      // silt_series, read from a CSV in any order
+    KEY_CURVE,      // silt_series, a number or a CSV over rising time
     KEY_POINT,      // double[3], as many numbers as dimensions
     KEY_PLACE,      // double[3], a place seen from above: a number in 2-D, [x, y] in 3-D
     KEY_PAIR,       // double[2]
@@ -31,6 +32,7 @@ typedef enum {
     KEY_BOX,        // double[6], two opposite corners, the lower first
     KEY_CHAIN,      // int at count, double * of 3 per point: at least 2 points
     KEY_POLYGON,    // int at count, double * of 3 per point: at least 3 points [x, y] (3-D: [x, z]), made counter-clockwise
+    KEY_CORNERS,    // int at count, double * of 3 per point: at least 3 points [x, y, z]
     KEY_BLOCK,      // mapping
     KEY_LIST,       // int at count, array of structs: sequence of mappings
 } silt_key_kind;
@@ -167,5 +169,6 @@ void silt_scene_settle(silt_reader *reader, silt_scene *scene);
 void silt_scene_check(silt_reader *reader, silt_scene *scene);
 /** the resolved scene as YAML; owned by the caller. names: files with their folder (true), or their last part only */
 char *silt_scene_text(const silt_scene *scene, bool folders);
+uint64_t silt_scene_hash(const silt_scene *scene); // scene_hash.c
 
 #endif

@@ -223,17 +223,18 @@ bool silt_polygon_sound(silt_reader *reader, const silt_tree *whole, const silt_
 
 static void read_points(read_state *state, const silt_key *key, const silt_tree *node, const char *path, int *count,
                         double **points) {
-    bool polygon = key->kind == KEY_POLYGON, space = state->scene->dimension == 3;
+    bool polygon = key->kind == KEY_POLYGON, space = state->scene->dimension == 3, corners = key->kind == KEY_CORNERS;
     int n = node->kind == TREE_LIST ? node->n_item : 0;
-    if (n < (polygon ? 3 : 2) || n > SCENE_CORNERS) {
+    if (n < (polygon || corners ? 3 : 2) || n > SCENE_CORNERS) {
         read_refuse(state, node, key, path, n > SCENE_CORNERS ? "; at most 20000" : "");
         return;
     }
     double *x = silt_alloc((size_t)n, 3 * sizeof *x);
     for (int i = 0; i < n; i++)
-        if (!read_coordinates(state, key, node->item[i], path, 2, space ? "[x, z]" : "[x, y]", x + 3 * i))
+        if (!read_coordinates(state, key, node->item[i], path, corners ? 3 : 2,
+                              corners ? "[x, y, z]" : space ? "[x, z]" : "[x, y]", x + 3 * i))
             goto cleanup;
-    if (!read_sound(state->reader, node, node, path, polygon, n, x))
+    if (!corners && !read_sound(state->reader, node, node, path, polygon, n, x))
         goto cleanup;
     free(*points);
     *points = x;
@@ -313,16 +314,21 @@ static void read_series(read_state *state, const silt_key *key, const silt_tree 
                         silt_series *value) {
     silt_error err = {0};
     char *file = NULL;
+    double x;
+    if (key->kind == KEY_CURVE && node->kind == TREE_SCALAR && !node->quoted && silt_text_number(node->text, &x)) {
+        silt_series_constant(value, read_number(state, key, node, path, &x) ? x : 0);
+        return;
+    }
     read_text(state, &(silt_key){.kind = KEY_FILE, .name = key->name}, node, path, &file);
     if (!file)
         return;
     silt_series_clear(value);
     silt_status status = silt_series_read(NULL, file, value, &err);
-    if (status == SILT_OK && key->kind == KEY_SERIES)
+    if (status == SILT_OK && key->kind != KEY_TABLE)
         status = silt_series_rising(value, &err);
     if (status != SILT_OK) {
         silt_complain(state->reader, node, "key '%s': found a file that cannot serve, allowed a CSV table%s: %s", path,
-                      key->kind == KEY_SERIES ? " over rising time" : "", err.text);
+                      key->kind != KEY_TABLE ? " over rising time" : "", err.text);
         silt_series_clear(value);
     }
     free(file);
@@ -377,6 +383,7 @@ static void read_row(read_state *state, const silt_key_table *table, const silt_
         break;
     case KEY_SERIES:
     case KEY_TABLE:
+    case KEY_CURVE:
         read_series(state, key, node, path, at);
         break;
     case KEY_POINT:
@@ -402,6 +409,7 @@ static void read_row(read_state *state, const silt_key_table *table, const silt_
         break;
     case KEY_CHAIN:
     case KEY_POLYGON:
+    case KEY_CORNERS:
         read_points(state, key, node, path, count, at);
         break;
     case KEY_BLOCK:
@@ -678,11 +686,13 @@ static void read_free(const silt_key_table *table, void *base) {
         case KEY_SURFACE:
         case KEY_CHAIN:
         case KEY_POLYGON:
+        case KEY_CORNERS:
             free(*(void **)at);
             *(void **)at = NULL;
             break;
         case KEY_SERIES:
         case KEY_TABLE:
+        case KEY_CURVE:
             silt_series_clear(at);
             break;
         case KEY_BLOCK:
@@ -707,50 +717,6 @@ void silt_scene_free(silt_scene **scene) {
     *scene = NULL;
 }
 
-// numbers of the tables and bytes of the files that the water's start and its walls are made from
-static uint64_t read_hash_series(uint64_t hash, const silt_series *series) {
-    return silt_hash(hash, series->value, (size_t)series->n_row * (size_t)series->n_column * sizeof *series->value);
-}
-
-static uint64_t read_hash_file(uint64_t hash, const char *path) {
-    char block[1 << 14];
-    FILE *file = path ? fopen(path, "rb") : NULL;
-    for (size_t n; file && (n = fread(block, 1, sizeof block, file)) > 0;)
-        hash = silt_hash(hash, block, n);
-    if (file)
-        fclose(file);
-    return hash;
-}
-
-static uint64_t read_hash_outline(uint64_t hash, const silt_region *region) {
-    return region->outline ? silt_hash(hash, region->point, (size_t)region->n_point * 3 * sizeof(double)) : hash;
-}
-
-// hash of the resolved text without folders, and of what the files hold
-static uint64_t read_hash(const silt_scene *scene) {
-    const silt_fluid_def *fluid = &scene->fluid;
-    char *text = silt_scene_text(scene, false);
-    uint64_t hash = silt_hash(0, text, strlen(text));
-    free(text);
-    for (int i = 0; i < fluid->n_inlet; i++) {
-        hash = read_hash_series(hash, &fluid->inlet[i].series);
-        hash = read_hash_series(hash, &fluid->inlet[i].head);
-    }
-    for (int i = 0; i < scene->n_wall; i++) {
-        hash = read_hash_series(hash, &scene->wall[i].motion);
-        hash = read_hash_file(hash, scene->wall[i].surface);
-    }
-    for (int i = 0; i < fluid->n_region; i++)
-        hash = read_hash_outline(hash, &fluid->region[i]);
-    for (int i = 0; i < scene->bed.n_region; i++)
-        hash = read_hash_outline(hash, &scene->bed.region[i]);
-    for (int i = 0; i < fluid->n_size; i++)
-        hash = read_hash_outline(hash, &fluid->size_at[i].region);
-    hash = read_hash_series(hash, &fluid->velocity.series);
-    hash = read_hash_series(hash, &fluid->force.series);
-    return read_hash_file(hash, fluid->cloud);
-}
-
 silt_status silt_scene_read(const char *path, int n_set, const char *const *set, silt_scene **scene, silt_error *err) {
     silt_reader reader = {0};
     read_state state = {.reader = &reader};
@@ -773,7 +739,7 @@ silt_status silt_scene_read(const char *path, int n_set, const char *const *set,
     silt_status status = silt_complaints_report(&reader, err);
     if (status == SILT_OK) {
         made->resolved = silt_scene_text(made, true);
-        made->hash = read_hash(made);
+        made->hash = silt_scene_hash(made);
         // the resolved scene must be readable again
         if (strlen(made->resolved) > SCENE_BYTES)
             status = silt_fail(err, SILT_INPUT,

@@ -143,6 +143,16 @@ static void settle_regions(silt_reader *reader, silt_scene *scene) {
         }
 }
 
+// surfaces ---------------------------------------------------------------------------------------------
+bool silt_surface_is_shape(const char *path) {
+    static const char *const ending[] = {".geo", ".step", ".stp", ".brep", ".iges", ".igs"};
+    const char *dot = strrchr(path, '.');
+    for (size_t k = 0; dot && k < sizeof ending / sizeof *ending; k++)
+        if (strcasecmp(dot, ending[k]) == 0)
+            return true;
+    return false;
+}
+
 // walls ------------------------------------------------------------------------------------------------
 static void settle_wall(silt_reader *reader, const silt_scene *scene, silt_wall *wall, int i) {
     static const char *const motion[4] = {"x", "y", "angle", "z"}; // z is last: not in 2-D
@@ -167,10 +177,11 @@ static void settle_wall(silt_reader *reader, const silt_scene *scene, silt_wall 
         const silt_tree *item = silt_tree_item(node, "surface");
         const char *end = strrchr(wall->surface, '.');
         FILE *file = fopen(wall->surface, "rb");
-        if (!end || (strcasecmp(end, ".stl") != 0 && strcasecmp(end, ".msh") != 0))
+        if (!end || (strcasecmp(end, ".stl") != 0 && strcasecmp(end, ".msh") != 0 && !silt_surface_is_shape(wall->surface)))
             silt_complain(reader, item,
-                          "key 'walls.%d.surface': found the file '%s', allowed one whose name ends in .stl or .msh", i,
-                          wall->surface);
+                          "key 'walls.%d.surface': found the file '%s', allowed one whose name ends in .stl or .msh, or in "
+                          ".geo, .step, .brep or .iges, for which gmsh is needed",
+                          i, wall->surface);
         else if (!file)
             silt_complain(reader, item,
                           "key 'walls.%d.surface': found no file %s that can be opened, allowed an STL or .msh file", i,

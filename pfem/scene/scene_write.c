@@ -108,10 +108,12 @@ static bool write_counts(const silt_key_table *table, const silt_key *key, const
         return *(char *const *)at != NULL;
     case KEY_SERIES:
     case KEY_TABLE:
+    case KEY_CURVE:
         return ((const silt_series *)at)->n_row > 0;
     case KEY_LIST:
     case KEY_CHAIN:
     case KEY_POLYGON:
+    case KEY_CORNERS:
         return *(const int *)count > 0 && write_present(key, base);
     case KEY_BLOCK:
         return write_present(key, base);
@@ -172,7 +174,11 @@ static void write_value(write_state *state, const silt_key *key, const void *bas
         break;
     case KEY_SERIES:
     case KEY_TABLE:
-        write_file(state, ((const silt_series *)at)->path);
+    case KEY_CURVE:
+        if (((const silt_series *)at)->path)
+            write_file(state, ((const silt_series *)at)->path);
+        else
+            write_number(to, ((const silt_series *)at)->value[1]);
         break;
     case KEY_POINT:
         write_numbers(to, dimension, at);
@@ -195,7 +201,8 @@ static void write_value(write_state *state, const silt_key *key, const void *bas
         break;
     case KEY_CHAIN:
     case KEY_POLYGON:
-        write_points(to, *(const int *)((const char *)base + key->count), 2, *(double *const *)at);
+    case KEY_CORNERS:
+        write_points(to, *(const int *)((const char *)base + key->count), key->kind == KEY_CORNERS ? 3 : 2, *(double *const *)at);
         break;
     default:
         break;

@@ -39,6 +39,17 @@ void silt_series_clear(silt_series *series) {
     *series = (silt_series){0};
 }
 
+void silt_series_constant(silt_series *series, double value) {
+    silt_series_clear(series);
+    series->n_row = 1;
+    series->n_column = 2;
+    series->name = silt_alloc(2, sizeof *series->name);
+    series->name[0] = silt_text("time");
+    series->name[1] = silt_text("value");
+    series->value = silt_alloc(2, sizeof *series->value);
+    series->value[1] = value;
+}
+
 int silt_series_column(const silt_series *series, const char *name) {
     for (int i = 0; i < series->n_column; i++)
         if (strcmp(series->name[i], name) == 0)

@@ -347,7 +347,10 @@ static silt_status msh_read(msh_reader *m, silt_error *err) {
     SILT_TRY(text_number(text, &version, err));
     SILT_TRY(text_integer(text, 0, 1, &binary, err));
     SILT_TRY(text_integer(text, 0, 64, &size, err));
-    if (binary || (version != 2.2 && version != 2.1 && version != 2 && version != 4.1))
+    const bool foreign = binary || (version != 2.2 && version != 2.1 && version != 2 && version != 4.1);
+    if (foreign && wall_gmsh_there())
+        return wall_gmsh_read(text->path, m->build->surface, err);
+    if (foreign)
         return silt_fail(err, SILT_INPUT, "%s: found version %g%s, allowed 2.2 or 4.1 as text (gmsh -0 -bin 0 -format msh41 -o NEW.msh %s)",
                          text->path, version, binary ? ", binary" : "", text->path);
     for (;;) {
@@ -508,6 +511,8 @@ static silt_status surface_parse(surface_text *text, silt_surface *surface, silt
     const char *dot = strrchr(text->path, '.');
     const size_t size = (size_t)(text->end - text->start);
     surface_build build = {.surface = surface};
+    if (silt_surface_is_shape(text->path))
+        return wall_gmsh_read(text->path, surface, err);
     if (dot && (strcmp(dot, ".msh") == 0 || strcmp(dot, ".MSH") == 0)) {
         msh_reader m = {.text = text, .build = &build};
         const silt_status status = msh_read(&m, err);

@@ -108,6 +108,30 @@ static void box_make(silt_walls *walls, int e, const silt_wall *wall) {
         }
 }
 
+// the walls once more, with holes where openings are
+static void elements_cut(silt_walls *walls, const silt_scene *scene) {
+    if (!silt_opening_count(scene))
+        return;
+    wall_piece *piece;
+    const int n = wall_cut(walls, scene, &piece);
+    silt_walls whole = *walls;
+    walls_reserve(walls, scene, n);
+    walls->n_degenerate = whole.n_degenerate;
+    for (int e = 0; e < n; e++) {
+        const int source = piece[e].source;
+        if (walls->dim == 3)
+            triangle_set(walls, e, piece[e].corner[0], piece[e].corner[1], piece[e].corner[2]);
+        for (int d = 0; d < 2 && walls->dim == 2; d++) {
+            walls->from[e][d] = piece[e].corner[0][d];
+            walls->to[e][d] = piece[e].corner[1][d];
+        }
+        memcpy(walls->normal[e], whole.normal[source], sizeof *walls->normal);
+        element_condition(walls, e, whole.wall[source], &scene->wall[whole.wall[source]]);
+    }
+    free(piece);
+    silt_walls_clear(&whole);
+}
+
 static void triangles_make(silt_walls *walls, const silt_scene *scene, const silt_surface *surface) {
     int e = 0;
     for (int w = 0; w < scene->n_wall; w++) {
@@ -366,6 +390,7 @@ silt_status silt_walls_create(silt_walls *walls, const silt_scene *scene, silt_e
             triangles_make(walls, scene, surface);
         else
             segments_make(walls, scene);
+        elements_cut(walls, scene);
         vertices_weld(walls);
         elements_join(walls);
         elements_group(walls);

@@ -88,6 +88,16 @@ void wall_sliding(const silt_walls *walls, int e, double v[3]);
 bool wall_given(const silt_walls *walls, int n, const int element[3], const double *const normal[3], const double own[3][3],
                 double out[3]);
 
+// wall_cut.c ------------------------------------------------------------------------------------------
+/** a part of an element, from the scene's place */
+typedef struct wall_piece {
+    double corner[3][3];
+    int source; // element that it is of
+} wall_piece;
+/** What is left of the elements, before they are joined, where openings through which the water's own motion carries it lie in
+ * them: outlets, and inlets with a head. @return how many pieces; *piece is owned by the caller */
+int wall_cut(const silt_walls *walls, const silt_scene *scene, wall_piece **piece);
+
 // surface.c -------------------------------------------------------------------------------------------
 /** a triangulated surface */
 typedef struct silt_surface {
@@ -102,6 +112,13 @@ typedef struct silt_surface {
  * Errors (SILT_INPUT, with file and line or triangle): unreadable, no triangles, two neighbours that are turned differently. */
 silt_status silt_surface_read(const char *path, double scale, bool inside_out, silt_surface *surface, silt_error *err);
 void silt_surface_clear(silt_surface *surface);
+
+// gmsh.c ----------------------------------------------------------------------------------------------
+/** true when the module that reads with gmsh is there */
+bool wall_gmsh_there(void);
+/** Reads what only gmsh can: shapes (.geo, .step, .brep, .iges), which it triangulates, and meshes in other forms.
+ * Errors (SILT_INPUT): no such module, or what gmsh says. */
+silt_status wall_gmsh_read(const char *path, silt_surface *surface, silt_error *err);
 /** Numbers points so that those closer than gap share one (gap 0: equal ones). @return how many numbers */
 int wall_weld(int n, const double (*point)[3], double gap, int *number);
 

@@ -482,11 +482,11 @@ static void fill_corners(contact *c, const uint8_t *flying, double h) {
     contact_slot *slot = NULL;
     int n_slot = 0, capacity = 0, *seated = NULL, n_seated = 0, seated_capacity = 0;
     for (int i = 0; i < nodes->count; i++) {
-        if (nodes->kind[i] != NODE_FLUID || nodes->wall[i][0] < 0)
+        if ((nodes->kind[i] != NODE_FLUID && nodes->kind[i] != NODE_OPEN) || nodes->wall[i][0] < 0)
             continue;
         contact_node p;
         node_load(c, i, h, &p);
-        if (p.n < c->dim && !(flying && flying[i]))
+        if (p.n < c->dim && nodes->kind[i] == NODE_FLUID && !(flying && flying[i]))
             slots_find(c, &p, i, &slot, &n_slot, &capacity);
         if (p.n > 1) {
             SILT_RESERVE(seated, seated_capacity, n_seated + 1);
