@@ -340,6 +340,79 @@ static void test_oscillating_drop(void **state) {
     bench_end(&b);
 }
 
+// forces of the surface's tension: they balance, and their work when the drop grows is that of its surface
+static void tension_balance(const bench *b, double tension) {
+    const silt_mesh *mesh = &b->run.mesh;
+    const int dim = b->scene->dimension;
+    const double *x = b->run.nodes.x;
+    double *force = silt_alloc((size_t)(dim * mesh->n_node), sizeof *force), sum[3] = {0}, work = 0, area = 0;
+    silt_tension_force(mesh, x, tension, force);
+    for (int i = 0; i < mesh->n_node; i++)
+        for (int d = 0; d < dim; d++) {
+            sum[d] += force[dim * i + d];
+            work += force[dim * i + d] * x[dim * i + d];
+        }
+    for (int k = 0; k < mesh->n_facet; k++) {
+        double u[3] = {0}, v[3] = {0}, n[3];
+        for (int d = 0; d < dim; d++) {
+            u[d] = x[dim * mesh->facet[k][1] + d] - x[dim * mesh->facet[k][0] + d];
+            v[d] = dim == 3 ? x[3 * mesh->facet[k][2] + d] - x[3 * mesh->facet[k][0] + d] : 0;
+        }
+        for (int d = 0; d < 3; d++)
+            n[d] = u[(d + 1) % 3] * v[(d + 2) % 3] - u[(d + 2) % 3] * v[(d + 1) % 3];
+        area += dim == 3 ? silt_length(3, n) / 2 : silt_length(2, u);
+    }
+    // a drop twice as large has (dim - 1)-th power of two as much surface
+    near(work / (-(dim - 1) * tension * area), 1, 1e-12, "work of the surface's tension");
+    near(silt_length(3, sum) / (tension * area), 0, 1e-12, "sum of the surface's tension");
+    free(force);
+}
+
+static void test_tension(void **state) {
+    (void)state;
+    // Rayleigh 1879: a flat drop swings with sqrt(6 tension/(density R^3)) = 1, pressure tension/R in the mean
+    bench b;
+    bench_start(&b, "cases/oscillating-drop/scene-tension.yaml", 2, (const char *const[]){"fluid.size=0.1", "time.output=0.3141593"});
+    tension_balance(&b, 166.66667);
+    double sum = 0, time = 0, crossing = 0, least = 2, most = 0, before = 0;
+    while (b.run.time < 2.2 * M_PI) {
+        bench_step(&b);
+        if (b.run.time < 2 * M_PI) {
+            sum += b.run.dt * pressure_at(&b, (double[2]){0, 0});
+            time += b.run.dt;
+        }
+        // wider than high or not: turns at pi and 2 pi
+        const double now = axis(&b, 0) - axis(&b, 1);
+        if (before < 0 && now >= 0)
+            crossing = b.run.time - b.run.dt * now / (now - before);
+        before = now;
+        least = silt_min(least, axis(&b, 0));
+        most = silt_max(most, axis(&b, 0));
+    }
+    print_message("drop of tension: period %+.3f %%, swing %.4f %.4f, pressure %+.3f %%\n", 100 * (crossing / (2 * M_PI) - 1),
+                  most, least, 100 * (sum / time / 166.66667 - 1));
+    near(crossing / (2 * M_PI), 1, 0.01, "period of a drop under surface tension");
+    near(most, 1.05, 0.002, "its widest");
+    near(least, 0.95, 0.003, "its slimmest");
+    near(sum / time / 166.66667, 1, 0.01, "its pressure");
+    near(integral(&b, one, NULL) / M_PI, 1, 0.002, "its area");
+    bench_end(&b);
+
+    // a sphere at rest: pressure 2 tension/R
+    bench_start(&b, "tests/scenes/tension-sphere.yaml", 0, NULL);
+    tension_balance(&b, 100);
+    bench_step(&b);
+    double pressure = 0, volume = 0;
+    for (int i = 0; i < b.run.mesh.n_node; i++) {
+        const double part = b.run.mesh.wet[i] ? b.run.fluid.volume[i] : 0;
+        pressure += part * b.run.nodes.p[i];
+        volume += part;
+    }
+    print_message("sphere of tension: pressure %+.3f %%, speed %.2e\n", 100 * (pressure / volume / 200 - 1), b.fastest);
+    near(pressure / volume / 200, 1, 0.03, "pressure in a sphere under surface tension");
+    bench_end(&b);
+}
+
 // ---------------------------------------------------------------- spinning water
 
 static void test_rotating_square(void **state) {
@@ -485,6 +558,7 @@ int main(void) {
         cmocka_unit_test(test_thrown),
         cmocka_unit_test(test_elliptic_drop),
         cmocka_unit_test(test_oscillating_drop),
+        cmocka_unit_test(test_tension),
         cmocka_unit_test(test_rotating_square),
         cmocka_unit_test(test_taylor_green),
         cmocka_unit_test(test_vortex_without_viscosity),

@@ -198,7 +198,7 @@ static void test_whole(void **state) {
     assert_true(f->flow == FLOW_TURBULENT && f->turbulence == TURBULENCE_MIXING_LENGTH && f->wall_height == 2);
     assert_true(f->rheology == RHEOLOGY_NEWTONIAN && f->yield_stress == 0 && f->flow_index == 1 && f->order == 2);
     assert_true(f->plastic_rate == 1e-3 && f->shuffle == 0 && f->n_size == 0 && f->size_growth == 0.3 && !f->cloud);
-    assert_true(f->air_pressure == 0 && f->air_exponent == 1.4 && f->force.kind == FORMULA_NONE);
+    assert_true(f->air_pressure == 0 && f->air_exponent == 1.4 && f->surface_tension == 0 && f->force.kind == FORMULA_NONE);
     assert_true(s->period[0] == 0 && s->period[1] == 0 && f->outlet[0].level.n_row == 0 && f->inlet[0].head.n_row == 0);
     assert_true(f->alpha == 1.3 && f->merge == 0.3 && f->tolerance == 1e-6 && f->iterations == 12);
     assert_true(f->volume_control && f->volume_steps == 15 && f->volume_time == 0 && f->jitter == 0 && f->seed == 1);
@@ -421,6 +421,7 @@ static void same_scene(const silt_scene *a, const silt_scene *b) {
     assert_memory_equal(&a->fluid.force, &b->fluid.force, offsetof(silt_formula, series));
     assert_true(a->fluid.shuffle == b->fluid.shuffle && a->fluid.size_growth == b->fluid.size_growth);
     assert_true(a->fluid.air_pressure == b->fluid.air_pressure && a->fluid.air_exponent == b->fluid.air_exponent);
+    assert_true(a->fluid.surface_tension == b->fluid.surface_tension);
     assert_int_equal(a->fluid.n_size, b->fluid.n_size);
     for (int i = 0; i < a->fluid.n_size; i++) {
         const silt_size_def *p = &a->fluid.size_at[i], *q = &b->fluid.size_at[i];

@@ -181,6 +181,8 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
             out[k] += f->wall_force[k];
     for (int k = 0; f->level_force && k < D * f->n_node; k++)
         out[k] += f->level_force[k];
+    if (s->scene->fluid.surface_tension > 0)
+        silt_tension_force(s->mesh, f->x_mid, s->scene->fluid.surface_tension, out);
     if (s->pockets)
         silt_pockets_force(s->pockets, D, 0.5 * s->dt, f->w, out);
     silt_assemble_pressure(f, s->mesh, p, out, NULL);
@@ -261,6 +263,18 @@ static int worst_residual(silt_fluid *f, const silt_step *s) {
         }
     }
     return worst;
+}
+
+// what continuity lacks with f->star. @return the node that lacks most
+static int star_continuity(silt_fluid *f, const silt_step *s, const double *p) {
+    const double *v = f->star;
+    if (f->shift) {
+        for (int k = 0; k < f->dim * f->n_node; k++)
+            f->scratch[k] = f->star[k] + f->shift[k];
+        v = f->scratch;
+    }
+    silt_assemble_continuity(f, s->mesh, s->drag, f->rate, v, p);
+    return worst_residual(f, s);
 }
 
 // v += P G q / inertia
@@ -538,14 +552,14 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             find_excess(f, s, f->force);
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
-        // far from the end of the iterations the momentum is not worth more than the pressure
-        SILT_TRY(velocity_star(f, s, stiff > 0, f->iterations && before > 10 * def->tolerance ? 1e-3 : 0, err));
-        if (f->shift)
-            for (int k = 0; k < D * f->n_node; k++)
-                f->scratch[k] = f->star[k] + f->shift[k];
-        silt_assemble_continuity(f, s->mesh, s->drag, f->rate, f->shift ? f->scratch : f->star, p);
-
-        const int worst_node = worst_residual(f, s);
+        // on the way the momentum is solved no further than it is worth; the iterate that ends it is solved out
+        const double drop = def->scheme == SCHEME_IMPLICIT && f->iterations && before > 10 * def->tolerance ? 1e-3 : 0;
+        SILT_TRY(velocity_star(f, s, stiff > 0, drop, err));
+        int worst_node = star_continuity(f, s, p);
+        if (stiff > 0 && drop > 0 && f->worst <= def->tolerance) {
+            SILT_TRY(silt_momentum_solve(f, s, f->force, 0, f->star, err));
+            worst_node = star_continuity(f, s, p);
+        }
         const double *place = s->nodes->x + D * worst_node;
         if (!isfinite(f->worst))
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);

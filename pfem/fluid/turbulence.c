@@ -6,10 +6,6 @@
 
 // ---- distances
 
-static double shortest(const silt_mesh *mesh, int d, double step) {
-    return mesh->period[d] > 0 ? step - mesh->period[d] * floor(step / mesh->period[d] + 0.5) : step;
-}
-
 static double segment_distance(int dim, const double *p, const double *a, const double *b) {
     double along = 0, length = 0, sum = 0;
     for (int d = 0; d < dim; d++) {
@@ -46,9 +42,9 @@ static double node_facet_distance(const silt_mesh *mesh, const double *x, int no
     const int dim = mesh->dim == 3 ? 3 : 2;
     double origin[3] = {0}, corner[9];
     for (int d = 0; d < dim; d++) {
-        corner[d] = shortest(mesh, d, x[dim * facet[0] + d] - x[dim * node + d]);
+        corner[d] = silt_shortest(mesh, d, x[dim * facet[0] + d] - x[dim * node + d]);
         for (int a = 1; a < dim; a++)
-            corner[dim * a + d] = corner[d] + shortest(mesh, d, x[dim * facet[a] + d] - x[dim * facet[0] + d]);
+            corner[dim * a + d] = corner[d] + silt_shortest(mesh, d, x[dim * facet[a] + d] - x[dim * facet[0] + d]);
     }
     return silt_facet_distance(dim, origin, corner);
 }

@@ -1,6 +1,7 @@
 /** @file viscosity.h
  * How water and mud resist being sheared: depth and distance to walls, eddy viscosity (turbulence.c), apparent viscosity of
- * yield-stress fluids (rheology.c), traction of walls whose boundary layer is thinner than a cell (wall_law.c).
+ * yield-stress fluids (rheology.c), traction of walls whose boundary layer is thinner than a cell (wall_law.c); and the pull of
+ * the free surface (tension.c).
  * Everything works in two and three dimensions: positions and velocities have `dim` numbers a node, velocity gradients
  * dim * dim numbers, row d holding dv_d/dx_k.
  *
@@ -17,6 +18,11 @@
 #include "pfem.h"
 
 #define SILT_KAPPA 0.41 // von Karman's constant
+
+/** a step along axis d by the shortest way, across a periodic border too */
+static inline double silt_shortest(const silt_mesh *mesh, int d, double step) {
+    return mesh->period[d] > 0 ? step - mesh->period[d] * floor(step / mesh->period[d] + 0.5) : step;
+}
 
 // ---------------------------------------------------------------- turbulence.c
 
@@ -137,5 +143,12 @@ void silt_wall_law_place(silt_wall_law *law, const silt_scene *scene, const silt
 void silt_wall_law_traction(silt_wall_law *law, const silt_scene *scene, int dim, const double *v, double *friction,
                             double *force);
 void silt_wall_law_clear(silt_wall_law *law);
+
+// ---------------------------------------------------------------- tension.c
+
+/** out += force of the free surface's tension (N/m) on the nodes at positions x */
+void silt_tension_force(const silt_mesh *mesh, const double *x, double tension, double *out);
+/** s, step in which the shortest ripples that cells of size h carry move by about their length (Brackbill et al. 1992) */
+double silt_tension_time(double tension, double density, double h);
 
 #endif

@@ -104,10 +104,6 @@ double silt_wall_stress(double rho, double nu, double speed, double height, doub
 
 // ---- where to look at the water
 
-static double shortest(const silt_mesh *mesh, int d, double step) {
-    return mesh->period[d] > 0 ? step - mesh->period[d] * floor(step / mesh->period[d] + 0.5) : step;
-}
-
 static double volume6(const double *a, const double *b, const double *c, const double *d) {
     double u[3], v[3], w[3];
     for (int k = 0; k < 3; k++) {
@@ -124,7 +120,7 @@ static bool weights(const silt_mesh *mesh, const double *x, int e, const double 
     double c[12], p[3];
     silt_cell_corners(mesh, x, mesh->cell[e], c);
     for (int d = 0; d < dim; d++)
-        p[d] = c[d] + shortest(mesh, d, point[d] - c[d]);
+        p[d] = c[d] + silt_shortest(mesh, d, point[d] - c[d]);
     if (dim == 2) {
         const double twice = (c[2] - c[0]) * (c[5] - c[1]) - (c[3] - c[1]) * (c[4] - c[0]);
         weight[1] = ((p[0] - c[0]) * (c[5] - c[1]) - (p[1] - c[1]) * (c[4] - c[0])) / twice;
@@ -217,7 +213,7 @@ static void point_sample(silt_wall_point *point, const silt_mesh *mesh, const do
         const int j = mesh->neighbour[m];
         double off = 0;
         for (int d = 0; d < dim; d++)
-            off += shortest(mesh, d, x[dim * j + d] - origin[d]) * point->normal[d];
+            off += silt_shortest(mesh, d, x[dim * j + d] - origin[d]) * point->normal[d];
         if (silt_min(off, wanted) <= point->height)
             continue;
         const double part = silt_min(wanted / off, 1);
@@ -251,7 +247,7 @@ static void toe_find(silt_wall_law *law, const silt_scene *scene, const silt_wal
             // out of the wetted part of the wall
             for (int b = 0; b < dim && law_wall; b++)
                 for (int d = 0; d < dim && b != a; d++)
-                    out[3 * facet[a] + d] += shortest(mesh, d, x[dim * facet[a] + d] - x[dim * facet[b] + d]);
+                    out[3 * facet[a] + d] += silt_shortest(mesh, d, x[dim * facet[a] + d] - x[dim * facet[b] + d]);
         }
     }
     int *list = silt_alloc((size_t)law->n_point + 1, sizeof *list);
@@ -271,7 +267,7 @@ static void toe_find(silt_wall_law *law, const silt_scene *scene, const silt_wal
         for (int k = 0; k < n_edge; k++) {
             double way = 0, off = 0;
             for (int d = 0; d < dim; d++) {
-                const double part = shortest(mesh, d, x[dim * point->node + d] - x[dim * list[k] + d]);
+                const double part = silt_shortest(mesh, d, x[dim * point->node + d] - x[dim * list[k] + d]);
                 way += part * part;
                 off += part * point->normal[d];
             }
@@ -323,7 +319,7 @@ void silt_wall_law_place(silt_wall_law *law, const silt_scene *scene, const silt
         double edge[2][3] = {{0}}, normal[3];
         for (int a = 1; a < dim; a++)
             for (int d = 0; d < dim; d++)
-                edge[a - 1][d] = shortest(mesh, d, x[dim * facet[a] + d] - x[dim * facet[0] + d]);
+                edge[a - 1][d] = silt_shortest(mesh, d, x[dim * facet[a] + d] - x[dim * facet[0] + d]);
         if (dim == 2) {
             normal[0] = -edge[0][1];
             normal[1] = edge[0][0];

@@ -54,6 +54,8 @@ static void info_model(const silt_scene *scene, FILE *to) {
     if (fluid->air_pressure > 0)
         fprintf(to, "  air        closed pockets, %g Pa when they close, exponent %g\n", fluid->air_pressure,
                 fluid->air_exponent);
+    if (fluid->surface_tension > 0)
+        fprintf(to, "  surface    tension %g N/m\n", fluid->surface_tension);
     if (scene->period[0] < scene->period[1])
         fprintf(to, "  periodic   in x from %g to %g m\n", scene->period[0], scene->period[1]);
 }

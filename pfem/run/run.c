@@ -103,6 +103,7 @@ static double step_wanted(const silt_run *run) {
             least = silt_min(least, h / speed);
         if (g > 0)
             least = silt_min(least, sqrt(h / g));
+        least = silt_min(least, silt_tension_time(scene->fluid.surface_tension, scene->fluid.density, h));
     }
     least = silt_min(least, walls_time(run));
     // water at rest meets a belt or a lid

@@ -161,6 +161,7 @@ typedef struct silt_fluid_def {
     silt_size_def *size_at; // owned; key `sizes`
     double air_pressure; // 0, Pa, absolute, of closed air pockets at their making; 0: pockets have no pressure
     double air_exponent; // 1.4, of their adiabatic compression
+    double surface_tension; // 0, N/m
     silt_formula force;  // acceleration besides gravity; key body_force
     int n_inlet;
     silt_inlet *inlet; // owned

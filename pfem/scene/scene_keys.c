@@ -299,6 +299,8 @@ static const silt_key fluid_rows[] = {
      .doc = "absolute, of the air that closed pockets hold when they close; 0: pockets have no pressure"},
     {"air_exponent", KEY_NUMBER, .fallback = "1.4", RANGE(1, 2), AT(silt_fluid_def, air_exponent),
      .doc = "of its compression; 1: isothermal, 1.4: adiabatic"},
+    {"surface_tension", KEY_NUMBER, .unit = "N/m", .fallback = "0", NOT_NEGATIVE, AT(silt_fluid_def, surface_tension),
+     .doc = "of the free surface, 0.073 of water in air; walls are neutral: the surface meets them at a right angle"},
     {"body_force", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &force_table, .presence = PRESENT_WORD,
      .present = offsetof(silt_fluid_def, force.kind), AT(silt_fluid_def, force),
      .doc = "acceleration of the water besides gravity"},
