@@ -123,8 +123,10 @@ int silt_walls_touching(const silt_walls *walls, const double *x, double reach, 
 int silt_walls_ridges(const silt_walls *walls, double h, double **point, int (**element)[3]);
 /** Nodes that lie on walls, after all nodes have moved from x_old: carries fixed nodes and those on walls without slip with their
  * walls, puts the others exactly on, lets them slide over bends and along creases, stop in corners and come free at edges,
- * attaches what has come through a wall or touches it, fills empty creases and corners with the nearest node. */
-void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double *x_old, const uint8_t *interior, double h);
+ * attaches what has come through a wall or touches it, fills empty creases and corners with the nearest node.
+ * @param flying  one per node: 1 for drops, which fill no creases; NULL: none */
+void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double *x_old, const uint8_t *interior,
+                        const uint8_t *flying, double h);
 
 // ---------------------------------------------------------------- nodes (node.c, seed.c)
 

@@ -154,7 +154,7 @@ static void test_volume_and_debt_close(void **state) {
         uint8_t wet[20000];
         memcpy(wet, b.mesh.wet, (size_t)b.nodes.count);
         const int n = b.nodes.count;
-        silt_walls_contact(&b.walls, &b.nodes, b.old, b.memory.interior, 0.05);
+        silt_walls_contact(&b.walls, &b.nodes, b.old, b.memory.interior, NULL, 0.05);
         rebuild(&b, true);
         for (int i = 0; i < n; i++)
             if (b.map[i] >= 0) {
@@ -183,13 +183,13 @@ static void test_contact_with_walls(void **state) {
     memcpy(b.old, b.nodes.x, 2 * (size_t)b.nodes.count * sizeof(double));
     memcpy(b.old + 2 * i, old, sizeof old);
     silt_memory_take(&b.memory, &b.mesh, &b.nodes);
-    silt_walls_contact(&b.walls, &b.nodes, b.old, b.memory.interior, 0.05);
+    silt_walls_contact(&b.walls, &b.nodes, b.old, b.memory.interior, NULL, 0.05);
     assert_int_equal(b.nodes.wall[i][0], 1);
     assert_true(b.nodes.x[2 * i + 1] == 0 && b.nodes.v[2 * i + 1] == 0 && b.nodes.v[2 * i] == 0.3);
     // sliding into the corner, it stays there
     b.nodes.x[2 * i] = 2.01;
     memcpy(b.old, b.nodes.x, 2 * (size_t)b.nodes.count * sizeof(double));
-    silt_walls_contact(&b.walls, &b.nodes, b.old, b.memory.interior, 0.05);
+    silt_walls_contact(&b.walls, &b.nodes, b.old, b.memory.interior, NULL, 0.05);
     assert_true(b.nodes.x[2 * i] == 2 && b.nodes.x[2 * i + 1] == 0 && b.nodes.wall[i][1] >= 0);
     // distances: inside positive, behind negative, at a corner by the nearest wall
     int segment;

@@ -380,6 +380,102 @@ static void test_tanks(void **state) {
                     "    [0.4, 0.2]]}]\n", 1, 0.12);
 }
 
+
+// ---- the same in space
+
+typedef double point[3];
+
+// a rectangle of two triangles, counter-clockwise as the water sees it
+static void quad(FILE *to, const point a, const point b, const point c, const point d) {
+    const double *corner[2][3] = {{a, b, c}, {a, c, d}};
+    for (int t = 0; t < 2; t++) {
+        fprintf(to, "facet normal 0 0 0\nouter loop\n");
+        for (int k = 0; k < 3; k++)
+            fprintf(to, "vertex %.9g %.9g %.9g\n", corner[t][k][0], corner[t][k][1], corner[t][k][2]);
+        fprintf(to, "endloop\nendfacet\n");
+    }
+}
+
+// sides and floor (or roof) of a box, from inside or outside
+static void tub(FILE *to, const point lo, const point hi, bool inside, bool floor) {
+    point c[8];
+    for (int k = 0; k < 8; k++)
+        for (int d = 0; d < 3; d++)
+            c[k][d] = k >> d & 1 ? hi[d] : lo[d];
+    static const int side[5][4] = {{0, 4, 5, 1}, {1, 5, 7, 3}, {3, 7, 6, 2}, {2, 6, 4, 0}, {0, 1, 3, 2}};
+    for (int k = 0; k < 5; k++) {
+        int n[4];
+        for (int a = 0; a < 4; a++)
+            n[a] = side[k][k < 4 && !inside ? 3 - a : a];
+        if (k == 4) // the roof seen from outside, the floor from inside, are both seen from above
+            for (int a = 0; a < 4; a++)
+                n[a] += floor ? 0 : 4;
+        if (k == 4 && !floor && inside)
+            quad(to, c[n[3]], c[n[2]], c[n[1]], c[n[0]]);
+        else
+            quad(to, c[n[0]], c[n[1]], c[n[2]], c[n[3]]);
+    }
+}
+
+#define SPACE "silt: 1\ndimension: 3\ntime: {end: 1, output: 1}\ngravity: [0, 0, -9.81]\n"
+#define COARSE "fluid:\n  density: 1000\n  viscosity: 0\n  size: 0.1\n  jitter: 0.2\n"
+
+static void space_tank(FILE *surface, const char *path, const char *fluid, int expected, double volume) {
+    fprintf(surface, "endsolid\n");
+    fclose(surface);
+    char text[1000];
+    snprintf(text, sizeof text, SPACE "%swalls: [{surface: %s}]\n", fluid, path);
+    tank(text, expected, volume);
+    unlink(path);
+}
+
+static FILE *surface_open(char path[]) {
+    const int fd = mkstemps(path, 4);
+    assert_true(fd >= 0);
+    FILE *to = fdopen(fd, "w");
+    fprintf(to, "solid\n");
+    return to;
+}
+
+static void test_tanks_in_space(void **state) {
+    (void)state;
+    const point lo = {0, 0, 0}, hi = {1, 0.5, 1};
+    const char *half = COARSE "  regions: [{box: [[0, 0, 0], [1, 0.5, 0.5]]}]\n";
+    // with a lid; a wedge of water whose air reaches into dry edges
+    char text[1000];
+    snprintf(text, sizeof text, SPACE "%swalls: [{box: [[0, 0, 0], [1, 0.5, 1]]}]\n", half);
+    tank(text, 1, 0.25);
+    tank(SPACE COARSE "  regions: [{polygon: [[0, 0], [1, 0], [0, 1]], across: [0, 0.5]}]\nwalls: [{box: [[0, 0, 0], [1, 0.5, 1]]}]\n", 1, 0.25);
+    // open above
+    char path[] = "/tmp/silt-pocket-XXXXXX.stl";
+    FILE *to = surface_open(path);
+    tub(to, lo, hi, true, true);
+    space_tank(to, path, half, 0, 0);
+    // a roof with a hole in it
+    strcpy(path, "/tmp/silt-pocket-XXXXXX.stl");
+    to = surface_open(path);
+    tub(to, lo, hi, true, true);
+    quad(to, (point){0, 0, 1}, (point){0, 0.5, 1}, (point){0.3, 0.5, 1}, (point){0.3, 0, 1});
+    quad(to, (point){0.6, 0, 1}, (point){0.6, 0.5, 1}, (point){1, 0.5, 1}, (point){1, 0, 1});
+    space_tank(to, path, half, 0, 0);
+    // a diving bell in an open tank
+    strcpy(path, "/tmp/silt-pocket-XXXXXX.stl");
+    to = surface_open(path);
+    tub(to, (point){0, 0, 0}, (point){1.2, 1.2, 1.2}, true, true);
+    const point o[2] = {{0.2, 0.2, 0.2}, {1, 1, 0.9}}, i[2] = {{0.4, 0.4, 0.2}, {0.8, 0.8, 0.7}};
+    tub(to, o[0], o[1], false, false);
+    tub(to, i[0], i[1], true, false);
+    const point rim[2][4] = {{{0.2, 0.2, 0.2}, {1, 0.2, 0.2}, {1, 1, 0.2}, {0.2, 1, 0.2}},
+                             {{0.4, 0.4, 0.2}, {0.8, 0.4, 0.2}, {0.8, 0.8, 0.2}, {0.4, 0.8, 0.2}}};
+    for (int k = 0; k < 4; k++)
+        quad(to, rim[0][(k + 1) % 4], rim[0][k], rim[1][k], rim[1][(k + 1) % 4]);
+    space_tank(to, path, "fluid:\n  density: 1000\n  viscosity: 0\n  size: 0.05\n  jitter: 0.2\n"
+               "  regions: [{box: [[0, 0, 0], [1.2, 1.2, 0.2]]}, {box: [[0, 0, 0.2], [0.2, 1.2, 1]]},\n"
+               "    {box: [[1, 0, 0.2], [1.2, 1.2, 1]]}, {box: [[0.2, 0, 0.2], [1, 0.2, 1]]},\n"
+               "    {box: [[0.2, 1, 0.2], [1, 1.2, 1]]}, {box: [[0.2, 0.2, 0.9], [1, 1, 1]]},\n"
+               "    {box: [[0.4, 0.4, 0.2], [0.8, 0.8, 0.4]]}]\n", 1, 0.4 * 0.4 * 0.3);
+}
+
 // ---- three dimensions: a cube of water with a cube of air in it, scaled
 
 static int compare_face(const void *a, const void *b) {
@@ -511,7 +607,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_ring_is_compressed), cmocka_unit_test(test_pockets_merge_split_open),
         cmocka_unit_test(test_checkpoint),         cmocka_unit_test(test_tanks),
-        cmocka_unit_test(test_three_dimensions),
+        cmocka_unit_test(test_tanks_in_space),    cmocka_unit_test(test_three_dimensions),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

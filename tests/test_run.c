@@ -203,6 +203,30 @@ static void fails_and_leaves(const char *path, int n_set, const char *const *set
     end(&run, &scene);
 }
 
+// ---------------------------------------------------------------- drops
+
+// it falls from the lid, along the wall beside it
+static void test_drop_under_lid(void **state) {
+    (void)state;
+    silt_run run;
+    silt_scene *scene;
+    const char *set[] = {"time.step=0.01"};
+    begin(&run, &scene, "tests/scenes/lid.yaml", 1, set);
+    double highest = 0, now = 0;
+    for (int k = 0; k < 30; k++) {
+        steps(&run, 1);
+        now = 0;
+        for (int i = 0; i < run.nodes.count; i++)
+            if (!run.mesh.wet[i] && run.nodes.kind[i] == NODE_FLUID)
+                now = silt_max(now, run.nodes.x[3 * i + 2]);
+        highest = silt_max(highest, now);
+    }
+    // half a second times g from the lid that it met at 0.03 s
+    assert_true(highest > 0.95 && highest < 1 + 1e-9);
+    assert_true(now > 0.6 && now < 0.7);
+    end(&run, &scene);
+}
+
 static void test_failed_step_water(void **state) {
     (void)state;
     fails_and_leaves("cases/dam-break/scene.yaml", 1, (const char *const[]){"fluid.size=0.006"}, 30, 10, false);
@@ -229,7 +253,7 @@ static void test_failed_step_thrown(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_water_alone),
-        cmocka_unit_test(test_failed_step_water),
+        cmocka_unit_test(test_drop_under_lid), cmocka_unit_test(test_failed_step_water),
         cmocka_unit_test(test_failed_step_coupled),
         cmocka_unit_test(test_failed_step_prescribed),
         cmocka_unit_test(test_failed_step_thrown),

@@ -201,7 +201,7 @@ static void test_whole(void **state) {
     assert_true(f->air_pressure == 0 && f->air_exponent == 1.4 && f->surface_tension == 0 && f->force.kind == FORMULA_NONE);
     assert_true(s->period[0] == 0 && s->period[1] == 0 && f->outlet[0].level.n_row == 0 && f->inlet[0].head.n_row == 0);
     assert_true(f->alpha == 1.3 && f->merge == 0.3 && f->tolerance == 1e-6 && f->iterations == 12);
-    assert_true(f->volume_control && f->volume_steps == 15 && f->jitter == 0 && f->seed == 1);
+    assert_true(f->volume_control && f->volume_steps == 15 && f->volume_time == 0 && f->jitter == 0 && f->seed == 1);
     assert_int_equal(f->n_region, 3);
     assert_int_equal(f->region[0].kind, REGION_BOX);
     assert_true(f->region[0].hi[0] == 1 && f->region[0].hi[1] == 1);
@@ -275,6 +275,7 @@ static void test_water(void **state) {
     assert_true(f->rheology == RHEOLOGY_HERSCHEL_BULKLEY && f->yield_stress == 30 && f->flow_index == 0.5);
     assert_true(f->plastic_rate == 0.01 && f->order == 1 && f->theta == 1 && f->shuffle == 0.1);
     assert_true(f->size_growth == 0.2 && f->air_pressure == 101325 && f->air_exponent == 1 && f->cloud[0] == '/');
+    assert_true(f->volume_time == 0.25);
     // the outline is given clockwise
     const double turned[12] = {2, 0, 0, 3, 0, 0, 3, 0.5, 0, 2, 0.5, 0};
     assert_true(f->region[1].kind == REGION_POLYGON && f->region[1].n_point == 4 && f->region[1].outline[0] == '/');

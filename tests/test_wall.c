@@ -108,7 +108,7 @@ static void step(bench *b, double dt, double h) {
     memcpy(b->old, b->nodes.x, (size_t)(dim * b->nodes.count) * sizeof(double));
     for (int k = 0; k < dim * b->nodes.count; k++)
         b->nodes.x[k] += dt * b->nodes.v[k];
-    silt_walls_contact(&b->walls, &b->nodes, b->old, b->interior, h);
+    silt_walls_contact(&b->walls, &b->nodes, b->old, b->interior, NULL, h);
 }
 
 static void assert_near(double a, double b, double tolerance) {

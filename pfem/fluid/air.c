@@ -3,6 +3,7 @@
 #include "pocket.h"
 
 #define AIR_NEAR 0.5   // times h: a point on a wall nearer to a node than this is left out
+#define AIR_ON 1e-3    // times h: a cell without volume this near to a wall lies on it
 #define AIR_BEYOND 0.35 // times h: a facet of the hull with a wall nearer than this, or bed or body this far behind, is shut
 
 // ---- facets by their nodes
@@ -179,23 +180,6 @@ static double cell_volume(int dim, const double *x, const int *cell) {
             e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) / 6;
 }
 
-// a point inside a cell: with it in place of any corner the cell keeps its sign
-static bool cell_holds(int dim, const double *x, const int *cell, const double *point) {
-    double local[15];
-    int own[5] = {0, 1, 2, 3, 4};
-    for (int a = 0; a <= dim; a++)
-        memcpy(local + dim * a, x + dim * cell[a], (size_t)dim * sizeof *x);
-    memcpy(local + dim * (dim + 1), point, (size_t)dim * sizeof *x);
-    for (int a = 0; a <= dim; a++) {
-        own[a] = dim + 1;
-        const double part = cell_volume(dim, local, own);
-        own[a] = a;
-        if (part < 0)
-            return false;
-    }
-    return true;
-}
-
 static bool same_cell(int dim, const int *a, const int *b) {
     for (int i = 0; i <= dim; i++) {
         bool found = false;
@@ -251,7 +235,7 @@ void silt_air_cells(silt_air *air, const silt_scene *scene, const silt_mesh *mes
         return;
 
     // water cells by their first facet's nodes and the others of the triangulation through it
-    int facet[3], *found = silt_alloc((size_t)mesh->n_cell + 1, sizeof *found);
+    int facet[3];
     uint8_t *water = silt_alloc((size_t)n, 1);
     silt_facet_map faces = {0}; // of the triangulation: each facet's cells
     silt_facet_map_create(&faces, n * stride);
@@ -273,11 +257,14 @@ void silt_air_cells(silt_air *air, const silt_scene *scene, const silt_mesh *mes
         if (here >= 0 && same_cell(dim, mesh->cell[e], cell + stride * here))
             water[here] = 1;
         else
-            found[air->n_missing++] = e;
+            air->n_missing++;
     }
 
-    // what is neither water nor solid
-    uint8_t *kept = silt_alloc((size_t)n, 1);
+    // what is neither water nor solid; where the water has cells of its own, the place decides
+    uint8_t *kept = silt_alloc((size_t)n, 1), *rim = silt_alloc((size_t)n, 1);
+    silt_locator locator = {0};
+    if (air->n_missing)
+        silt_locator_build(&locator, mesh, air->x, h);
     for (int e = 0; e < n; e++) {
         const int *c = cell + stride * e;
         if (water[e])
@@ -286,10 +273,17 @@ void silt_air_cells(silt_air *air, const silt_scene *scene, const silt_mesh *mes
         for (int a = 0; a <= dim; a++)
             for (int d = 0; d < dim; d++)
                 middle[d] += air->x[dim * c[a] + d] / stride;
-        bool wet = false;
-        for (int k = 0; k < air->n_missing && !wet; k++)
-            wet = cell_holds(dim, air->x, mesh->cell[found[k]], middle);
-        kept[e] = !wet && fabs(cell_volume(dim, air->x, c)) > flat && !silt_barrier_contains(barrier, middle);
+        double weight[4];
+        const bool wet = air->n_missing && silt_locate(&locator, mesh, air->x, middle, weight) >= 0;
+        int element;
+        // points in a lattice make cells without volume: within the air they join their neighbours, on walls they are nothing
+        if (!wet && fabs(cell_volume(dim, air->x, c)) <= flat) {
+            for (int a = 0; a <= dim; a++)
+                rim[e] |= across[e][a] < 0;
+            rim[e] |= barrier->walls && barrier->walls->count &&
+                      fabs(silt_walls_distance(barrier->walls, middle, &element)) < AIR_ON * h;
+        }
+        kept[e] = !wet && !rim[e] && !silt_barrier_contains(barrier, middle);
     }
     for (int e = 0; e < n; e++) {
         if (!kept[e])
@@ -299,9 +293,7 @@ void silt_air_cells(silt_air *air, const silt_scene *scene, const silt_mesh *mes
         SILT_RESERVE(air->open, air->open_capacity, air->n_cell + 1);
         uint8_t open = 0;
         for (int a = 0; a <= dim && !open; a++) {
-            // beyond flat cells on the hull too
-            if (across[e][a] < 0 || (!water[across[e][a]] && !kept[across[e][a]] &&
-                                     fabs(cell_volume(dim, air->x, cell + stride * across[e][a])) <= flat))
+            if (across[e][a] < 0 || rim[across[e][a]])
                 open = beyond_is_open(air, barrier, c, a, h);
         }
         air->cell[air->n_cell][3] = -1;
@@ -310,16 +302,15 @@ void silt_air_cells(silt_air *air, const silt_scene *scene, const silt_mesh *mes
     }
     silt_facet_map_clear(&faces);
     free(across);
-    free(found);
+    silt_locator_clear(&locator);
     free(water);
     free(kept);
+    free(rim);
 }
 
 silt_status silt_air_find(silt_air *air, const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh,
                           const silt_barrier *barrier, silt_error *err) {
     const int dim = silt_nodes_dim(nodes);
-    if (dim != 2)
-        return silt_fail(err, SILT_FAILED, "closed air pockets are found in two dimensions only");
     silt_air_points(air, scene, nodes, mesh, barrier->walls);
     int *live = silt_alloc((size_t)air->n_point + 1, sizeof *live), m = 0, *cell = NULL, n_cell = 0;
     double *x = silt_alloc((size_t)(dim * air->n_point) + 1, sizeof *x);
@@ -328,7 +319,7 @@ silt_status silt_air_find(silt_air *air, const silt_scene *scene, const silt_nod
             memcpy(x + dim * m, air->x + dim * i, (size_t)dim * sizeof *x);
             live[m++] = i;
         }
-    const int failed = silt_delaunay_2d(m, x, &cell, &n_cell);
+    const int failed = (dim == 3 ? silt_delaunay_3d : silt_delaunay_2d)(m, x, &cell, &n_cell);
     for (int k = 0; !failed && k < (dim + 1) * n_cell; k++)
         cell[k] = live[cell[k]];
     if (!failed)

@@ -41,8 +41,9 @@ void silt_debts_ask(silt_fluid *f, const silt_step *s) {
     if (!s->scene->fluid.volume_control)
         return;
     const double g = gravity_size(s->scene);
-    const double least = g > 0 ? 2 * sqrt(s->scene->fluid.size / g) : 0;
-    const double time = silt_max(s->scene->fluid.volume_steps * s->dt, least);
+    const silt_fluid_def *def = &s->scene->fluid;
+    const double least = def->volume_time > 0 ? def->volume_time : g > 0 ? 2 * sqrt(def->size / g) : 0;
+    const double time = silt_max(def->volume_steps * s->dt, least);
     double *change = f->residual;
     for (int sweep = 0; sweep < 4; sweep++) {
         memset(change, 0, (size_t)f->n_node * sizeof(double));

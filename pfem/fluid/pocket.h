@@ -35,8 +35,7 @@ bool silt_air_skips(const silt_nodes *nodes, const silt_mesh *mesh, int point);
 /** Takes the cells of a triangulation of those points (dim + 1 points each) that are air, and marks what has open air beyond. */
 void silt_air_cells(silt_air *air, const silt_scene *scene, const silt_mesh *mesh, const silt_barrier *barrier, int n,
                     const int *cell);
-/** All of it in 2-D: points, Delaunay, cells. Errors: SILT_FAILED, no memory for the triangulation, or 3-D (where the caller
- * triangulates the points between silt_air_points and silt_air_cells). */
+/** All of it: points, Delaunay, cells. Errors: SILT_FAILED, no memory for the triangulation. */
 silt_status silt_air_find(silt_air *air, const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh,
                           const silt_barrier *barrier, silt_error *err);
 void silt_air_clear(silt_air *air);

@@ -45,29 +45,33 @@ static void fly(silt_run *run, int i) {
     double *x = nodes->x + D * i, *v = nodes->v + D * i, a[3];
     const double dt = run->dt;
     silt_run_acceleration(run, x, a);
-    const int s = nodes->wall[i][0];
-    if (s >= 0) {
-        double vector[3], own[3], given[3];
-        silt_walls_velocity(&run->walls, run->scene, s, x, own);
-        const double *n = run->walls.normal[s], an = silt_dot(D, a, n), vn = silt_dot(D, v, n);
-        // pressed on: left alone it would come nearer to the wall than the wall goes away from it
-        if (vn - silt_dot(D, own, n) + 0.5 * dt * an <= 0) {
-            silt_walls_given(&run->walls, run->scene, nodes->wall[i], x, given);
-            const silt_hold hold = silt_walls_hold(&run->walls, nodes->wall[i], vector);
-            if (hold == HOLD_ALL) { // stuck, or in a corner
-                for (int d = 0; d < D; d++) {
-                    v[d] = given[d];
-                    x[d] += dt * v[d];
-                }
-                return;
-            }
-            const double along = silt_dot(D, a, vector), speed = silt_dot(D, v, vector);
+    // of the walls that it touches those press on it that it would come nearer to, left alone, than they go away; from a lid
+    // it falls, along the wall beside it
+    int kept = 0, wall[3] = {-1, -1, -1};
+    for (int k = 0; k < 3 && nodes->wall[i][k] >= 0; k++) {
+        double own[3];
+        silt_walls_velocity(&run->walls, run->scene, nodes->wall[i][k], x, own);
+        const double *n = run->walls.normal[nodes->wall[i][k]];
+        if (silt_dot(D, v, n) - silt_dot(D, own, n) + 0.5 * dt * silt_dot(D, a, n) <= 0)
+            wall[kept++] = nodes->wall[i][k];
+    }
+    memcpy(nodes->wall[i], wall, sizeof wall);
+    if (kept) {
+        double vector[3], given[3];
+        silt_walls_given(&run->walls, run->scene, nodes->wall[i], x, given);
+        const silt_hold hold = silt_walls_hold(&run->walls, nodes->wall[i], vector);
+        if (hold == HOLD_ALL) { // stuck, or in a corner
             for (int d = 0; d < D; d++) {
-                a[d] = hold == HOLD_NORMAL ? a[d] - along * vector[d] : along * vector[d];
-                v[d] = (hold == HOLD_NORMAL ? v[d] - speed * vector[d] : speed * vector[d]) + given[d];
+                v[d] = given[d];
+                x[d] += dt * v[d];
             }
-        } else
-            nodes->wall[i][0] = nodes->wall[i][1] = nodes->wall[i][2] = -1;
+            return;
+        }
+        const double along = silt_dot(D, a, vector), speed = silt_dot(D, v, vector);
+        for (int d = 0; d < D; d++) {
+            a[d] = hold == HOLD_NORMAL ? a[d] - along * vector[d] : along * vector[d];
+            v[d] = (hold == HOLD_NORMAL ? v[d] - speed * vector[d] : speed * vector[d]) + given[d];
+        }
     }
     for (int d = 0; d < D; d++) {
         x[d] += dt * (v[d] + 0.5 * dt * a[d]);
@@ -310,7 +314,11 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     for (int i = 0; i < nodes->count; i++)
         run->wall_before[i] = nodes->wall[i][0];
     memcpy(run->v_before, nodes->v, (size_t)(D * nodes->count) * sizeof(double));
-    silt_walls_contact(&run->walls, nodes, run->x_old, run->memory.interior, h);
+    uint8_t *flying = silt_alloc((size_t)nodes->count + 1, 1);
+    for (int i = 0; i < n; i++)
+        flying[i] = !mesh->wet[i];
+    silt_walls_contact(&run->walls, nodes, run->x_old, run->memory.interior, flying, h);
+    free(flying);
     hand_on_landing(run, run->wall_before, run->v_before);
     let_out(run);
     expel(run);

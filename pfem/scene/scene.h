@@ -149,6 +149,7 @@ typedef struct silt_fluid_def {
     int iterations;      // largest number of iterations per step
     bool volume_control; // give back what remeshing created or lost, over volume_steps steps
     double volume_steps;
+    double volume_time;  // s, and at least this long; 0: 2 sqrt(size/g)
     double jitter;       // times h, random shift of the initial nodes inside the water
     int seed;
     int n_region;

@@ -278,6 +278,8 @@ static const silt_key fluid_rows[] = {
      .doc = "give back the volume that reconnecting created or lost"},
     {"volume_steps", KEY_NUMBER, .unit = "steps", .fallback = "15", RANGE(1, 1e6), AT(silt_fluid_def, volume_steps),
      .doc = "over how many steps it is given back"},
+    {"volume_time", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_fluid_def, volume_time),
+     .doc = "and over what time at least; 0: twice the time sqrt(size/g)"},
     {"jitter", KEY_NUMBER, .unit = "h", .fallback = "0", RANGE(0, 0.5), AT(silt_fluid_def, jitter),
      .doc = "random shift of the first nodes inside the water"},
     {"seed", KEY_INTEGER, .fallback = "1", RANGE(0, INT32_MAX), AT(silt_fluid_def, seed), .doc = "of that shift"},

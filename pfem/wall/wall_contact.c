@@ -477,7 +477,7 @@ static bool slot_taken(const contact *c, const contact_slot *s, const int *seate
 }
 
 // the first water node that comes within reach of an empty crease or corner is put into it
-static void fill_corners(contact *c, double h) {
+static void fill_corners(contact *c, const uint8_t *flying, double h) {
     silt_nodes *nodes = c->nodes;
     contact_slot *slot = NULL;
     int n_slot = 0, capacity = 0, *seated = NULL, n_seated = 0, seated_capacity = 0;
@@ -486,7 +486,7 @@ static void fill_corners(contact *c, double h) {
             continue;
         contact_node p;
         node_load(c, i, h, &p);
-        if (p.n < c->dim && nodes->kind[i] == NODE_FLUID)
+        if (p.n < c->dim && nodes->kind[i] == NODE_FLUID && !(flying && flying[i]))
             slots_find(c, &p, i, &slot, &n_slot, &capacity);
         if (p.n > 1) {
             SILT_RESERVE(seated, seated_capacity, n_seated + 1);
@@ -513,7 +513,8 @@ static void fill_corners(contact *c, double h) {
     free(seated);
 }
 
-void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double *x_old, const uint8_t *interior, double h) {
+void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double *x_old, const uint8_t *interior,
+                        const uint8_t *flying, double h) {
     if (!walls->count)
         return;
     contact c = {.walls = walls, .nodes = nodes, .x_old = x_old, .dim = wall_dim(walls)};
@@ -532,6 +533,6 @@ void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double
             node_store(&c, i, &p);
         }
     }
-    fill_corners(&c, h);
+    fill_corners(&c, flying, h);
     free(c.list);
 }
