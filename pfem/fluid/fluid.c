@@ -10,7 +10,7 @@
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 
 void silt_fluid_clear(silt_fluid *f) {
-    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
+    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->start, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
                        f->level_force, f->level_brake, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
                        f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->normal, f->given, f->cg[0],
@@ -68,6 +68,7 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         const int need = n_cell + n_cell / 2 + 64, have_cells = f->cell_capacity;
         ROOM(flux, (D + 1) * D, have_cells, need);
         ROOM(cell_volume, 1, have_cells, need);
+        ROOM(start, 1, have_cells, need);
         ROOM(inverse, 1, have_cells, need);
         ROOM(mu, 1, have_cells, need);
         ROOM(tau, 1, have_cells, need);
@@ -631,6 +632,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     resist_begin(f, s);
     if (f->shift)
         memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);
+    f->shaped = false;
     silt_assemble_geometry(f, s, s->dt);
     if (s->pockets)
         silt_pockets_load(s->pockets, s->mesh, f->x_mid);

@@ -1,6 +1,6 @@
 /** @file fluid.h
  * One step of the water: momentum, pressure, correction on the midpoint mesh (docs/method.md, "Fluid"), in 2-D and 3-D.
- * Rooms: fluid.c the step, hold.c what surroundings hold, assemble.c integrals over cells, tension.c the surface's pull,
+ * Rooms: fluid.c the step, hold.c what surroundings hold, geometry.c shapes of the cells, assemble.c integrals over them, tension.c the surface's pull,
  * momentum.c the viscous system,
  * pressure.c the pressure system, stiff.c both at once where viscosity is stiff, debt.c volume that is owed and water that cannot keep its volume.
  */
@@ -33,6 +33,7 @@ typedef struct silt_fluid {
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
+    double *start;        // owned, per cell, volume where the nodes are
     double *inverse;      // owned, per cell, 1/volume, bounded in slivers: gradients are flux times this
     double *mu;           // owned, per cell, Pa s, effective viscosity
     double *tau;          // owned, per cell, stabilisation
@@ -60,6 +61,7 @@ typedef struct silt_fluid {
     double *given;        // owned, dim per node, velocity of what is held
     silt_wall_normals wall_normals; // owned, of nodes on bent walls
     double *cg[3];        // owned, dim per node, momentum solver
+    bool shaped;          // shapes and x_mid are of this step
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned
     silt_stiff *stiff;    // owned
@@ -118,9 +120,12 @@ silt_hold silt_level_hold(const silt_step *step, int i, double vector[3]);
  * level_brake, the latter added to friction. */
 void silt_levels_load(silt_fluid *fluid, const silt_step *step);
 
-// assemble.c ---------------------------------------------------------------------------------------------
-/** geometry, masses and stabilisation on the mesh half way along dt w; dt = 0: where the nodes are */
+// geometry.c ---------------------------------------------------------------------------------------------
+/** Geometry, masses and stabilisation on the mesh half way along dt w; dt = 0: where the nodes are. Shapes are made anew only when
+ * a node's midpoint is another one, or not `shaped`. */
 void silt_assemble_geometry(silt_fluid *fluid, const silt_step *step, double dt);
+
+// assemble.c ---------------------------------------------------------------------------------------------
 /** out += G p; adds to lost (may be NULL) what acts on the grains */
 void silt_assemble_pressure(const silt_fluid *fluid, const silt_mesh *mesh, const double *p, double *out, double *lost);
 /** out -= int N_i grad potential: at rest the pressure answers it to rounding, on any mesh */
