@@ -2,6 +2,19 @@
 #include "fluid.h"
 #include "kernel.h"
 
+// a cell's V grad N_a, and nodal vectors: copies, since the compiler must read anew after every store what it may have changed
+KERNEL cell_flux(const int D, const silt_fluid *f, int e, double g[4][3]) {
+    for (int a = 0; a <= D; a++)
+        for (int d = 0; d < D; d++)
+            g[a][d] = f->flux[((D + 1) * e + a) * D + d];
+}
+
+KERNEL cell_nodal(const int D, const double *x, const int *cell, double v[4][3]) {
+    for (int a = 0; a <= D; a++)
+        for (int d = 0; d < D; d++)
+            v[a][d] = x[D * cell[a] + d];
+}
+
 KERNEL pressure(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, double *lost) {
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
@@ -47,29 +60,47 @@ KERNEL potential(const int D, const silt_fluid *f, const silt_mesh *mesh, double
 
 void silt_assemble_potential(const silt_fluid *f, const silt_mesh *mesh, double *out) { BY_DIM(potential, f, mesh, out); }
 
-KERNEL viscous(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, double factor, double *out) {
+// diagonal: NULL, or the operator's is added to it
+KERNEL viscous(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, double factor, double *out, double *diagonal) {
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        const double *flux = f->flux + (D + 1) * D * e;
-        double l[3][3] = {{0}}, trace = 0;
-        for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++)
-                for (int k = 0; k < D; k++)
-                    l[d][k] += v[D * cell[a] + d] * flux[D * a + k];
-        for (int d = 0; d < D; d++)
-            trace += l[d][d];
-        const double scale = factor * f->mu[e] * f->inverse[e];
+        double g[4][3], u[4][3], l[3][3], stress[3][3], trace = 0;
+        cell_flux(D, f, e, g);
+        cell_nodal(D, v, cell, u);
         for (int d = 0; d < D; d++)
             for (int k = 0; k < D; k++) {
-                const double stress = scale * (l[d][k] + l[k][d] - (d == k ? 2.0 / 3 * trace : 0));
-                for (int a = 0; a <= D; a++)
-                    out[D * cell[a] + d] += stress * flux[D * a + k];
+                l[d][k] = u[0][d] * g[0][k];
+                for (int a = 1; a <= D; a++)
+                    l[d][k] += u[a][d] * g[a][k];
             }
+        for (int d = 0; d < D; d++)
+            trace += l[d][d];
+        const double scale = f->mu[e] * f->inverse[e], force = factor * scale;
+        for (int d = 0; d < D; d++)
+            for (int k = 0; k <= d; k++)
+                stress[d][k] = stress[k][d] = force * (l[d][k] + l[k][d] - (d == k ? 2.0 / 3 * trace : 0));
+        for (int a = 0; a <= D; a++)
+            for (int d = 0; d < D; d++) {
+                double sum = stress[d][0] * g[a][0];
+                for (int k = 1; k < D; k++)
+                    sum += stress[d][k] * g[a][k];
+                out[D * cell[a] + d] += sum;
+            }
+        for (int a = 0; a <= D && diagonal; a++) {
+            double square = 0;
+            for (int d = 0; d < D; d++)
+                square += silt_square(g[a][d]);
+            diagonal[cell[a]] += (1 + 4.0 / (3 * D)) * scale * square;
+        }
     }
 }
 
 void silt_assemble_viscous(const silt_fluid *f, const silt_mesh *mesh, const double *v, double factor, double *out) {
-    BY_DIM(viscous, f, mesh, v, factor, out);
+    BY_DIM(viscous, f, mesh, v, factor, out, NULL);
+}
+
+void silt_assemble_viscous_both(const silt_fluid *f, const silt_mesh *mesh, const double *v, double *out, double *diagonal) {
+    BY_DIM(viscous, f, mesh, v, 1, out, diagonal);
 }
 
 KERNEL viscous_diagonal(const int D, const silt_fluid *f, const silt_mesh *mesh, double *diagonal) {
@@ -107,34 +138,47 @@ void silt_assemble_mass_excess(const silt_fluid *f, const silt_mesh *mesh, doubl
     BY_DIM(mass_excess, f, mesh, density, a, out);
 }
 
-KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p) {
+KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, const double *potential) {
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        const double *flux = f->flux + (D + 1) * D * e, *share = f->share ? f->share + (D + 1) * e : NULL;
-        double divergence = 0, carried[3] = {0}, stable[3];
-        for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++)
-                divergence += v[D * cell[a] + d] * flux[D * a + d];
-        if (share)
-            for (int a = 0; a <= D; a++)
-                for (int d = 0; d < D; d++)
-                    carried[d] += share[a] * v[D * cell[a] + d];
-        for (int d = 0; d < D; d++) {
-            double slope = 0, mean = 0;
-            for (int a = 0; a <= D; a++) {
-                slope += (p[cell[a]] + (f->potential ? f->potential[cell[a]] : 0)) * flux[D * a + d];
-                mean += f->projection[D * cell[a] + d] / (D + 1);
-            }
-            stable[d] = f->tau[e] * f->inverse[e] * (slope + f->cell_volume[e] * mean);
-        }
+        const double *share = f->share ? f->share + (D + 1) * e : NULL;
+        double g[4][3], u[4][3], pi[4][3], head[4], divergence = 0, carried[3] = {0}, stable[3];
+        cell_flux(D, f, e, g);
+        cell_nodal(D, v, cell, u);
+        cell_nodal(D, f->projection, cell, pi);
         for (int a = 0; a <= D; a++) {
-            double gain = divergence / (D + 1), smooth = 0;
-            for (int d = 0; d < D; d++) {
-                smooth += flux[D * a + d] * stable[d];
-                gain += flux[D * a + d] * carried[d];
+            head[a] = p[cell[a]] + (potential ? potential[cell[a]] : 0);
+            for (int d = 0; d < D; d++)
+                divergence += u[a][d] * g[a][d];
+        }
+        for (int a = 0; a <= D && share; a++)
+            for (int d = 0; d < D; d++)
+                carried[d] += share[a] * u[a][d];
+        const double weight = f->tau[e] * f->inverse[e], part = f->cell_volume[e] * (1.0 / (D + 1));
+        for (int d = 0; d < D; d++) {
+            double slope = 0, sum = 0;
+            for (int a = 0; a <= D; a++) {
+                slope += head[a] * g[a][d];
+                sum += pi[a][d];
             }
-            f->residual[cell[a]] += smooth;
-            *(f->mobile[cell[a]] == 1 ? &f->residual[cell[a]] : &f->withheld[cell[a]]) += gain;
+            stable[d] = weight * (slope + part * sum);
+        }
+        bool all = true;
+        for (int a = 0; a <= D; a++)
+            all &= f->mobile[cell[a]] == 1;
+        for (int a = 0; a <= D; a++) {
+            double gain = divergence * (1.0 / (D + 1)), smooth = 0;
+            for (int d = 0; d < D; d++) {
+                smooth += g[a][d] * stable[d];
+                if (share)
+                    gain += g[a][d] * carried[d];
+            }
+            if (all || f->mobile[cell[a]] == 1)
+                f->residual[cell[a]] += smooth + gain;
+            else {
+                f->residual[cell[a]] += smooth;
+                f->withheld[cell[a]] += gain;
+            }
         }
     }
 }
@@ -146,23 +190,29 @@ void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_d
         f->residual[j] = f->mobile[j] == 1 ? asked : 0;
         f->withheld[j] = f->mobile[j] == 1 ? 0 : asked;
     }
-    BY_DIM(continuity, f, mesh, v, p);
+    if (f->potential)
+        BY_DIM(continuity, f, mesh, v, p, f->potential);
+    else
+        BY_DIM(continuity, f, mesh, v, p, NULL);
 }
 
-KERNEL projection(const int D, silt_fluid *f, const silt_mesh *mesh, const double *p) {
+KERNEL projection(const int D, silt_fluid *f, const silt_mesh *mesh, const double *p, const double *potential) {
     memset(f->projection, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
     memset(f->projection_weight, 0, (size_t)f->n_node * sizeof(double));
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        const double *flux = f->flux + (D + 1) * D * e, weight = f->tau[e] * f->cell_volume[e];
-        for (int a = 0; a <= D; a++)
+        const double tau = f->tau[e], weight = tau * f->cell_volume[e];
+        double g[4][3], slope[3] = {0};
+        cell_flux(D, f, e, g);
+        for (int a = 0; a <= D; a++) {
+            const double head = p[cell[a]] + (potential ? potential[cell[a]] : 0);
+            for (int d = 0; d < D; d++)
+                slope[d] += head * g[a][d];
+        }
+        for (int a = 0; a <= D; a++) {
             f->projection_weight[cell[a]] += weight;
-        for (int d = 0; d < D; d++) {
-            double slope = 0;
-            for (int a = 0; a <= D; a++)
-                slope += (p[cell[a]] + (f->potential ? f->potential[cell[a]] : 0)) * flux[D * a + d];
-            for (int a = 0; a <= D; a++)
-                f->projection[D * cell[a] + d] -= f->tau[e] * slope;
+            for (int d = 0; d < D; d++)
+                f->projection[D * cell[a] + d] -= tau * slope[d];
         }
     }
     for (int i = 0; i < f->n_node; i++)
@@ -171,7 +221,12 @@ KERNEL projection(const int D, silt_fluid *f, const silt_mesh *mesh, const doubl
                 f->projection[D * i + d] /= f->projection_weight[i];
 }
 
-void silt_assemble_projection(silt_fluid *f, const silt_mesh *mesh, const double *p) { BY_DIM(projection, f, mesh, p); }
+void silt_assemble_projection(silt_fluid *f, const silt_mesh *mesh, const double *p) {
+    if (f->potential)
+        BY_DIM(projection, f, mesh, p, f->potential);
+    else
+        BY_DIM(projection, f, mesh, p, NULL);
+}
 
 KERNEL divergence(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, double *out) {
     memset(out, 0, (size_t)f->n_node * sizeof(double));

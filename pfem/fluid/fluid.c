@@ -131,10 +131,10 @@ static void body_force(const silt_fluid *f, const silt_step *s, int i, double a[
 // Lumped masses make waves slow, by 0.3 % at 40 nodes a wave. One sweep towards the consistent mass: with the acceleration
 // a = M_l^-1 F the force gets (M_l - M_c) a, so that the mass's inverse is M_l^-1 (2 M_l - M_c) M_l^-1: symmetric, between 1 and
 // 1.75 times that of the lumped one, and the sum of the momenta stays what it is. Where viscosity is stiff its share is left out;
-// with grains, whose drag may be stiff, the masses stay lumped.
-static void find_excess(silt_fluid *f, const silt_step *s, const double *right) {
+// with grains, whose drag may be stiff, the masses stay lumped. After silt_momentum_look at w where there is viscosity.
+static void find_excess(silt_fluid *f, const silt_step *s, double stiff, const double *right) {
     const int D = f->dim;
-    const double theta_dt = f->theta * s->dt, stiff = stiffness(f, s), *v = s->nodes->v;
+    const double theta_dt = f->theta * s->dt, *v = s->nodes->v;
     double *a = f->cg[0];
     memset(f->excess, 0, (size_t)(D * f->n_node) * sizeof(double));
     if (s->drag)
@@ -145,7 +145,8 @@ static void find_excess(silt_fluid *f, const silt_step *s, const double *right) 
         for (int d = 0; d < D; d++)
             a[D * i + d] -= f->mass[i] * v[D * i + d] / theta_dt + (f->inertia[i] - f->mass[i] / theta_dt) * f->w[D * i + d];
     if (stiff > 0 && stiff < 0.1)
-        silt_assemble_viscous(f, s->mesh, f->w, stiff / 0.1 - 1, a);
+        for (int k = 0; k < D * f->n_node; k++)
+            a[k] += (stiff / 0.1 - 1) * f->scratch[k];
     for (int i = 0; i < f->n_node; i++) {
         for (int d = 0; d < D; d++)
             a[D * i + d] = s->mesh->wet[i] && f->mass[i] > 0 ? a[D * i + d] / f->mass[i] : 0;
@@ -222,19 +223,23 @@ static void resist_begin(silt_fluid *f, const silt_step *s) {
         SILT_RESERVE(f->wall_force, f->wall_capacity, f->dim * f->n_node + 1);
 }
 
-// velocity with the pressure of the last iterate, from the right side in f->force
-static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid, double drop, silt_error *err) {
+// velocity with the pressure of the last iterate, from the right side in f->force, after silt_momentum_look at w where there is
+// viscosity. solved: to all digits
+static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid, double drop, bool *solved, silt_error *err) {
+    *solved = true;
     const int D = f->dim;
     if (s->scene->fluid.scheme == SCHEME_IMPLICIT && viscid) {
         memcpy(f->star, f->w, (size_t)D * (size_t)f->n_node * sizeof(double));
         for (int i = 0; i < f->n_node && f->wall_normals.n_row; i++)
             silt_hold_impose(f, i, f->star + D * i); // normals that have changed with the midpoint mesh
         silt_status status;
-        SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, drop, f->star, err));
+        if (f->wall_normals.n_row)
+            SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->star));
+        SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, drop, f->star, solved, err));
         SILT_TRY(status);
     } else {
-        if (viscid)
-            silt_assemble_viscous(f, s->mesh, f->w, -1, f->force);
+        for (int k = 0; k < D * f->n_node && viscid; k++)
+            f->force[k] -= f->scratch[k];
         for (int i = 0; i < f->n_node; i++) {
             const double stand = viscid ? f->stand[i] : 0;
             for (int d = 0; d < D; d++)
@@ -344,8 +349,9 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
         any = f->rate[i] != 0;
     memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);
     for (int pass = 0; pass < 2 && any; pass++) {
-        memset(f->increment, 0, (size_t)f->n_node * sizeof *f->increment);
-        silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
+        memset(pass ? f->increment : f->residual, 0, (size_t)f->n_node * sizeof(double));
+        if (pass) // at first there is none
+            silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
         for (int i = 0; i < f->n_node; i++)
             f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
         SILT_TRY(pressure_increment(f, s, 0.03, err));
@@ -361,16 +367,21 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
     const double dt = s->dt, *v = s->nodes->v;
     double *out = f->reaction, lost[3] = {0}, unbalanced[3] = {0};
     momentum_right(f, s, p, out);
+    memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
+    silt_assemble_viscous(f, s->mesh, f->w, 1, f->scratch);
+    f->dissipated = 0;
     for (int i = 0; i < f->n_node; i++)
-        for (int d = 0; d < D; d++)
-            out[D * i + d] = f->inertia[i] * f->w[D * i + d] - out[D * i + d] - f->excess[D * i + d];
-    silt_assemble_viscous(f, s->mesh, f->w, 1, out);
+        for (int d = 0; d < D; d++) {
+            const int k = D * i + d;
+            out[k] = f->inertia[i] * f->w[k] - out[k] - f->excess[k] + f->scratch[k];
+            f->dissipated += dt * f->scratch[k] * f->w[k]; // w . K w
+        }
 
     memset(f->from_grains, 0, sizeof f->from_grains);
     f->momentum_scale = 0;
     f->worked = 0;
-    memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
-    silt_assemble_pressure(f, s->mesh, p, f->scratch, lost);
+    if (drag)
+        silt_assemble_pressure(f, s->mesh, p, f->scratch, lost);
     for (int i = 0; i < f->n_node; i++) {
         if (!s->mesh->wet[i]) {
             for (int d = 0; d < D; d++)
@@ -408,13 +419,6 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
         for (int d = 0; d < D && s->mesh->wet[i]; d++)
             out[D * i + d] += f->wall_force[D * i + d] - f->friction[i] * f->w[D * i + d];
     }
-
-    // viscous dissipation w . K w
-    memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
-    silt_assemble_viscous(f, s->mesh, f->w, 1, f->scratch);
-    f->dissipated = 0;
-    for (int k = 0; k < D * f->n_node; k++)
-        f->dissipated += dt * f->scratch[k] * f->w[k];
 }
 
 // stiff viscosity: the pressure's operator is nearly the mass matrix over the viscosity, its inverse adds to that of S + L
@@ -549,16 +553,21 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         const bool squeezed = s->pockets && silt_pockets_stiff(s->pockets, D, 0.5 * s->dt, f->mass) > 0.1;
         momentum_right(f, s, p, f->force);
         const bool refresh = (first && stiff <= FLUID_STIFF) || f->iterations < FLUID_REFRESH;
+        if (stiff > 0)
+            SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->w));
         if (refresh)
-            find_excess(f, s, f->force);
+            find_excess(f, s, stiff, f->force);
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
         // on the way the momentum is solved no further than it is worth; the iterate that ends it is solved out
         const double drop = def->scheme == SCHEME_IMPLICIT && f->iterations && before > 10 * def->tolerance ? 1e-3 : 0;
-        SILT_TRY(velocity_star(f, s, stiff > 0, drop, err));
+        bool solved;
+        SILT_TRY(velocity_star(f, s, stiff > 0, drop, &solved, err));
         int worst_node = star_continuity(f, s, p);
-        if (stiff > 0 && drop > 0 && f->worst <= def->tolerance) {
-            SILT_TRY(silt_momentum_solve(f, s, f->force, 0, f->star, err));
+        if (!solved && f->worst <= def->tolerance) {
+            SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->star));
+            SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, 0, f->star, &solved, err));
+            SILT_TRY(status);
             worst_node = star_continuity(f, s, p);
         }
         const double *place = s->nodes->x + D * worst_node;

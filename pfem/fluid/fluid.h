@@ -104,7 +104,11 @@ void silt_hold_bent(silt_fluid *fluid, const silt_step *step);
 /** silt_hold_impose; on bent walls the velocity keeps its size: turning does no work */
 void silt_hold_turn(const silt_fluid *fluid, int i, double *v);
 /** takes the held components out of a vector of dim numbers */
-void silt_hold_project(const silt_fluid *fluid, int i, double *v);
+void silt_hold_project_held(const silt_fluid *fluid, int i, double *v);
+static inline void silt_hold_project(const silt_fluid *f, int i, double *v) { // most are free: no call for them
+    if (f->hold[i] != HOLD_FREE)
+        silt_hold_project_held(f, i, v);
+}
 /** v with its held components replaced by the given ones */
 void silt_hold_impose(const silt_fluid *fluid, int i, double *v);
 
@@ -132,6 +136,8 @@ void silt_assemble_pressure(const silt_fluid *fluid, const silt_mesh *mesh, cons
 void silt_assemble_potential(const silt_fluid *fluid, const silt_mesh *mesh, double *out);
 /** out += factor K v: viscous force, deviatoric */
 void silt_assemble_viscous(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, double factor, double *out);
+/** the same with factor 1, and diagonal += diagonal of K in one sweep */
+void silt_assemble_viscous_both(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, double *out, double *diagonal);
 /** diagonal += diagonal of K, its mean over the components */
 void silt_assemble_viscous_diagonal(const silt_fluid *fluid, const silt_mesh *mesh, double *diagonal);
 /** out += (lumped - consistent mass) a */
@@ -145,9 +151,13 @@ void silt_assemble_projection(silt_fluid *fluid, const silt_mesh *mesh, const do
 void silt_assemble_divergence(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, const double *p, double *out);
 
 // momentum.c ---------------------------------------------------------------------------------------------
-/** (inertia + K) v = right on the free components; v holds the first guess with held components in place.
- * To six digits more than fluid.tolerance, or to `drop` times the residual of the first guess where that is more. */
-silt_status silt_momentum_solve(silt_fluid *fluid, const silt_step *step, const double *right, double drop, double *v,
+/** What a solve starts from, for the present geometry, viscosity and first guess: scratch = K v, increment = diagonal of inertia + K.
+ * Neither may be touched until then. */
+void silt_momentum_look(silt_fluid *fluid, const silt_mesh *mesh, const double *v);
+/** (inertia + K) v = right on the free components, after silt_momentum_look; v holds the first guess with held components in place.
+ * To six digits more than fluid.tolerance, or to `drop` times the residual of the first guess where that is more.
+ * @param solved  out, whether it got to the six digits */
+silt_status silt_momentum_solve(silt_fluid *fluid, const silt_step *step, const double *right, double drop, double *v, bool *solved,
                                 silt_error *err);
 
 // debt.c -------------------------------------------------------------------------------------------------
