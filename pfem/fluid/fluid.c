@@ -13,10 +13,12 @@ void silt_fluid_clear(silt_fluid *f) {
     double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->start, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
                        f->level_force, f->level_brake, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
-                       f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->normal, f->given, f->cg[0],
+                       f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->pressure_new, f->v_start, f->normal, f->given, f->cg[0],
                        f->cg[1], f->cg[2]};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
+    free(f->piece);
+    free(f->walk);
     free(f->hold);
     free(f->mobile);
     silt_pressure_free(&f->pressure);
@@ -50,6 +52,8 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         ROOM(given, D, have_nodes, need);
         for (int k = 0; k < 3; k++)
             ROOM(cg[k], D, have_nodes, need);
+        ROOM(v_start, D, have_nodes, need);
+        ROOM(pressure_new, 1, have_nodes, need);
         ROOM(projection_weight, 1, have_nodes, need);
         ROOM(mass, 1, have_nodes, need);
         ROOM(volume, 1, have_nodes, need);
@@ -104,10 +108,7 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
 
 // mu theta dt/(rho h^2): the largest, and the mean over the water
 static double stiffness(const silt_fluid *f, const silt_step *s) {
-    double mu = 0;
-    for (int e = 0; e < f->n_cell; e++)
-        mu = silt_max(mu, f->mu[e]);
-    return mu * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
+    return f->mu_max * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
 }
 
 static double mean_stiffness(const silt_fluid *f, const silt_step *s) {
@@ -201,15 +202,20 @@ static void resist(silt_fluid *f, const silt_step *s) {
     if (f->level_force)
         silt_levels_load(f, s);
     silt_assemble_geometry(f, s, s->dt);
-    if (silt_viscosity_varies(s->scene) && (f->iterations < FLUID_CLOSURE || s->scene->fluid.rheology != RHEOLOGY_NEWTONIAN))
+    if (silt_viscosity_varies(s->scene) && (f->iterations < FLUID_CLOSURE || s->scene->fluid.rheology != RHEOLOGY_NEWTONIAN)) {
         silt_viscosity_update(s->scene, s->nodes, s->mesh, &f->depth, f->flux, f->inverse, f->w, f->iterations ? 0.5 : 1, f->mu,
                               &f->viscosity);
+        f->mu_max = 0;
+        for (int e = 0; e < f->n_cell; e++)
+            f->mu_max = silt_max(f->mu_max, f->mu[e]);
+    }
 }
 
 // what resistance needs once a step
 static void resist_begin(silt_fluid *f, const silt_step *s) {
     for (int e = 0; e < f->n_cell; e++)
         f->mu[e] = s->scene->fluid.viscosity;
+    f->mu_max = f->n_cell ? s->scene->fluid.viscosity : 0;
     memset(f->friction, 0, (size_t)f->n_node * sizeof *f->friction);
     if (silt_viscosity_varies(s->scene))
         silt_depth_update(&f->depth, s->scene, s->walls, s->nodes, s->mesh, s->nodes->x);
@@ -449,9 +455,7 @@ static silt_status astray_node(const silt_fluid *f, const silt_step *s, silt_err
 // The trapezoidal rule turns the sign of modes that viscosity brings to rest within the step and hardly damps them: where
 // N = mu dt/(rho h^2) is large the step goes over to backward Euler, whose error such modes do not feel.
 static bool choose_theta(silt_fluid *f, const silt_step *s) {
-    double mu = 0;
-    for (int e = 0; e < f->n_cell && s->scene->fluid.flow == FLOW_LAMINAR; e++)
-        mu = silt_max(mu, f->mu[e]);
+    const double mu = s->scene->fluid.flow == FLOW_LAMINAR ? f->mu_max : 0;
     const double number = mu * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
     const double before = f->theta;
     if (number > FLUID_DAMPED)
@@ -503,10 +507,23 @@ static double swirl(const silt_fluid *f, const silt_step *s) {
     return most * s->dt;
 }
 
+// fluid.tolerance is a share of a node's volume in a step of the usual length: many short steps shall not gain more than a few long
+// ones, or still water starts to swirl. @return what to multiply it by
+static double strictness(const silt_fluid *f, const silt_step *s) {
+    const double h = s->scene->fluid.size;
+    double fastest = sqrt(h * silt_length(3, s->scene->gravity));
+    for (int i = 0; i < f->n_node; i++)
+        if (s->mesh->wet[i])
+            fastest = silt_max(fastest, silt_length(f->dim, s->nodes->v + f->dim * i));
+    const double least = silt_clamp(1e-12 / s->scene->fluid.tolerance, 0.01, 1); // rounding
+    return fastest > 0 && !f->last_try ? silt_clamp(s->dt * fastest / (0.5 * h), least, 1) : 1;
+}
+
 static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, silt_error *err) {
     const silt_fluid_def *def = &s->scene->fluid;
     const bool consistent = def->pressure == PRESSURE_CONSISTENT;
     const int D = f->dim;
+    const double strict = strictness(f, s);
     const bool direct = D == 2 && consistent && def->scheme == SCHEME_IMPLICIT; // momentum and continuity can be factored as one
     const size_t bytes = (size_t)D * (size_t)f->n_node * sizeof(double);
     double before = HUGE_VAL;
@@ -560,11 +577,11 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
         // on the way the momentum is solved no further than it is worth; the iterate that ends it is solved out
-        const double drop = def->scheme == SCHEME_IMPLICIT && f->iterations && before > 10 * def->tolerance ? 1e-3 : 0;
+        const double drop = def->scheme == SCHEME_IMPLICIT && f->iterations && before > 10 * strict * def->tolerance ? 1e-3 : 0;
         bool solved;
         SILT_TRY(velocity_star(f, s, stiff > 0, drop, &solved, err));
         int worst_node = star_continuity(f, s, p);
-        if (!solved && f->worst <= def->tolerance) {
+        if (!solved && f->worst <= strict * def->tolerance) {
             SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->star));
             SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, 0, f->star, &solved, err));
             SILT_TRY(status);
@@ -574,7 +591,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         if (!isfinite(f->worst))
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
         const bool passed = def->scheme == SCHEME_IMPLICIT || stiff == 0 || f->iterations > 0;
-        const bool fine = passed && f->worst <= (first ? 0.1 : 1) * def->tolerance && (!first || swirl(f, s) <= def->tolerance);
+        const bool fine = passed && f->worst <= (first ? 0.1 : 1) * strict * def->tolerance && (!first || swirl(f, s) <= def->tolerance);
         // at the end of the iterations a small residual is accepted; a first pressure takes longer to meet its projection
         if (fine || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);
@@ -648,7 +665,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     silt_debts_ask(f, s);
 
     // kept apart until the step is accepted
-    double *p = silt_alloc((size_t)f->n_node + 1, sizeof *p), *v = silt_alloc((size_t)(D * f->n_node) + 1, sizeof *v);
+    double *p = f->pressure_new, *v = f->v_start;
     memcpy(v, nodes->v, (size_t)D * (size_t)f->n_node * sizeof(double));
     for (int i = 0; i < f->n_node; i++)
         // with the Laplacian the surface's pressure is prescribed
@@ -679,7 +696,5 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         }
     } else
         memcpy(nodes->v, v, (size_t)D * (size_t)f->n_node * sizeof(double));
-    free(p);
-    free(v);
     return status;
 }

@@ -61,6 +61,11 @@ typedef struct silt_fluid {
     double *given;        // owned, dim per node, velocity of what is held
     silt_wall_normals wall_normals; // owned, of nodes on bent walls
     double *cg[3];        // owned, dim per node, momentum solver
+    double *pressure_new, *v_start; // owned, 1 and dim per node: kept apart until the step is accepted
+    int *piece, *walk;    // owned, per node: lowest node of its piece of water; working space
+    int64_t piece_revision; // of the mesh that these pieces belong to
+    int piece_capacity, walk_capacity;
+    double mu_max;        // Pa s, largest of mu
     bool shaped;          // shapes and x_mid are of this step
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned
