@@ -1,5 +1,5 @@
-// shapes of the cells on the midpoint mesh, masses and stabilisation. Cells are taken LANES at a time: what is reckoned for one
-// is reckoned for all of them by the same instruction
+// shapes of the cells on the midpoint mesh, masses and stabilisation. Cells are taken two at a time: what is reckoned for one
+// is reckoned for both by the same instruction
 #include "fluid.h"
 #include "kernel.h"
 
@@ -8,7 +8,7 @@
 #define REGULAR 0.1178511 // volume of a regular tetrahedron of edge 1
 
 #pragma GCC diagnostic ignored "-Wpsabi" // lanes are passed within this file only
-#define LANES 4
+#define LANES 2 // what an SSE2 register holds
 typedef double lane __attribute__((vector_size(LANES * sizeof(double))));
 #define LANE static inline __attribute__((always_inline)) lane
 
@@ -17,7 +17,8 @@ typedef struct silt_shapes {
     lane flux[4][3], volume, inverse; // V grad N_a, V, 1/V bounded
 } silt_shapes;
 
-LANE take(const double *x, const int at[LANES]) { return (lane){x[at[0]], x[at[1]], x[at[2]], x[at[3]]}; }
+LANE take(const double *x, const int at[LANES]) { return (lane){x[at[0]], x[at[1]]}; }
+typedef long long lane_order __attribute__((vector_size(LANES * sizeof(long long))));
 
 // corners of cells, joined the shortest way across a periodic border
 KERNEL corners(const int D, const double period, const double *x, const int at[4][LANES], lane c[4][3]) {
@@ -67,9 +68,10 @@ LANE bounded_inverse(const int D, lane c[4][3], const lane *whole) {
                 square += (c[b][d] - c[a][d]) * (c[b][d] - c[a][d]);
     square = square * (1.0 / 6);
     const lane least = SLIVER * SLIVER * REGULAR * REGULAR * square * square * square; // its square
-    for (int l = 0; l < LANES; l++)
-        if (!(volume[l] > 0 && volume[l] * volume[l] >= least[l]))
-            volume[l] = sqrt(least[l]);
+    if (!(volume[0] > 0 && volume[0] * volume[0] >= least[0]))
+        volume[0] = sqrt(least[0]);
+    if (!(volume[1] > 0 && volume[1] * volume[1] >= least[1]))
+        volume[1] = sqrt(least[1]);
     return 1 / volume;
 }
 
@@ -92,8 +94,9 @@ KERNEL shapes_way(const int D, const double period, const double *x, const doubl
             out->flux[a][d] += more[a][d] * (1.0 / 3);
 }
 
-// lanes of cells that went flat on their way: the shape at the start
-KERNEL shapes_flat(const int D, const double period, const double *x, const int at[4][LANES], const bool flat[LANES], silt_shapes *out) {
+// lanes of cells that went flat on their way: the shape at the start. Few: in registers what is out of the way here would be in memory
+static __attribute__((noinline, cold)) void shapes_flat(int D, double period, const double *x, const int at[4][LANES],
+                                                        const bool flat[LANES], silt_shapes *out) {
     lane c[4][3], flux[4][3];
     corners(D, period, x, at, c);
     const lane volume = shape(D, c, flux), inverse = bounded_inverse(D, c, &volume);
@@ -129,29 +132,36 @@ KERNEL starts(const int D, const double period, silt_fluid *f, const silt_mesh *
     }
 }
 
+// V grad N_a to the cells, two numbers at a time
+KERNEL store_flux(const int D, lane flux[4][3], bool both, double *out) {
+    const int n = (D + 1) * D;
+    for (int k = 0; k < n; k += 2) {
+        const lane one = flux[k / D][k % D], two = flux[(k + 1) / D][(k + 1) % D];
+        const lane first = __builtin_shuffle(one, two, (lane_order){0, 2}), second = __builtin_shuffle(one, two, (lane_order){1, 3});
+        memcpy(out + k, &first, sizeof first);
+        if (both)
+            memcpy(out + n + k, &second, sizeof second);
+    }
+}
+
 KERNEL shapes(const int D, const double period, silt_fluid *f, const silt_mesh *mesh, const double *x) {
     memset(f->volume, 0, (size_t)f->n_node * sizeof(double));
     for (int e = 0; e < f->n_cell; e += LANES) {
         int at[4][LANES];
         silt_shapes s;
-        bool flat[LANES], any = false;
-        const int many = places(D, f, mesh, e, at);
+        const bool both = places(D, f, mesh, e, at) == LANES;
         shapes_way(D, period, x, f->x_mid, at, &s);
-        for (int l = 0; l < many; l++)
-            any |= flat[l] = !(s.volume[l] > FLAT_STEP * f->start[e + l]);
-        if (any) {
-            for (int l = many; l < LANES; l++)
-                flat[l] = false;
-            shapes_flat(D, period, x, at, flat, &s);
+        const bool flat[LANES] = {!(s.volume[0] > FLAT_STEP * f->start[e]), both && !(s.volume[1] > FLAT_STEP * f->start[e + 1])};
+        if (flat[0] || flat[1]) {
+            silt_shapes mended = s;
+            shapes_flat(D, period, x, at, flat, &mended);
+            s = mended;
         }
+        store_flux(D, s.flux, both, f->flux + (D + 1) * D * e);
         const lane part = s.volume * (1.0 / (D + 1));
-        for (int l = 0; l < many; l++) {
+        for (int l = 0; l < LANES && (l == 0 || both); l++) {
             f->cell_volume[e + l] = s.volume[l];
             f->inverse[e + l] = s.inverse[l];
-            double *out = f->flux + (D + 1) * D * (e + l);
-            for (int a = 0; a <= D; a++)
-                for (int d = 0; d < D; d++)
-                    out[D * a + d] = s.flux[a][d][l];
             for (int a = 0; a <= D; a++)
                 f->volume[mesh->cell[e + l][a]] += part[l];
         }
