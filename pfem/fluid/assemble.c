@@ -15,33 +15,33 @@ KERNEL cell_nodal(const int D, const double *x, const int *cell, double v[4][3])
             v[a][d] = x[D * cell[a] + d];
 }
 
-KERNEL pressure(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, double *lost) {
+KERNEL pressure(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, const double *shares, double *lost) {
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        const double *flux = f->flux + (D + 1) * D * e, *share = f->share ? f->share + (D + 1) * e : NULL;
-        double mean = 0;
+        const double *share = shares ? shares + (D + 1) * e : NULL;
+        double g[4][3], slope[3] = {0}, mean = 0, sum = 0;
+        cell_flux(D, f, e, g);
         for (int a = 0; a <= D; a++)
-            mean += p[cell[a]] / (D + 1);
+            mean += p[cell[a]];
+        mean *= 1.0 / (D + 1);
+        for (int a = 0; a <= D && shares; a++) {
+            sum += share[a];
+            for (int d = 0; d < D; d++)
+                slope[d] += p[cell[a]] * g[a][d];
+        }
         for (int a = 0; a <= D; a++)
             for (int d = 0; d < D; d++)
-                out[D * cell[a] + d] += flux[D * a + d] * mean;
-        if (share)
-            for (int d = 0; d < D; d++) {
-                double slope = 0, sum = 0;
-                for (int a = 0; a <= D; a++)
-                    slope += p[cell[a]] * flux[D * a + d];
-                for (int a = 0; a <= D; a++) {
-                    out[D * cell[a] + d] += share[a] * slope;
-                    sum += share[a];
-                }
-                if (lost)
-                    lost[d] += slope * sum;
-            }
+                out[D * cell[a] + d] += shares ? g[a][d] * mean + share[a] * slope[d] : g[a][d] * mean;
+        for (int d = 0; d < D && shares && lost; d++)
+            lost[d] += slope[d] * sum;
     }
 }
 
 void silt_assemble_pressure(const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, double *lost) {
-    BY_DIM(pressure, f, mesh, p, out, lost);
+    if (f->share)
+        BY_DIM(pressure, f, mesh, p, out, f->share, lost);
+    else
+        BY_DIM(pressure, f, mesh, p, out, NULL, NULL);
 }
 
 KERNEL potential(const int D, const silt_fluid *f, const silt_mesh *mesh, double *out) {
@@ -138,10 +138,11 @@ void silt_assemble_mass_excess(const silt_fluid *f, const silt_mesh *mesh, doubl
     BY_DIM(mass_excess, f, mesh, density, a, out);
 }
 
-KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, const double *potential) {
+KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, const double *potential,
+                  const double *shares) {
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        const double *share = f->share ? f->share + (D + 1) * e : NULL;
+        const double *share = shares ? shares + (D + 1) * e : NULL;
         double g[4][3], u[4][3], pi[4][3], head[4], divergence = 0, carried[3] = {0}, stable[3];
         cell_flux(D, f, e, g);
         cell_nodal(D, v, cell, u);
@@ -151,7 +152,7 @@ KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const doubl
             for (int d = 0; d < D; d++)
                 divergence += u[a][d] * g[a][d];
         }
-        for (int a = 0; a <= D && share; a++)
+        for (int a = 0; a <= D && shares; a++)
             for (int d = 0; d < D; d++)
                 carried[d] += share[a] * u[a][d];
         const double weight = f->tau[e] * f->inverse[e], part = f->cell_volume[e] * (1.0 / (D + 1));
@@ -170,7 +171,7 @@ KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const doubl
             double gain = divergence * (1.0 / (D + 1)), smooth = 0;
             for (int d = 0; d < D; d++) {
                 smooth += g[a][d] * stable[d];
-                if (share)
+                if (shares)
                     gain += g[a][d] * carried[d];
             }
             if (all || f->mobile[cell[a]] == 1)
@@ -190,10 +191,10 @@ void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_d
         f->residual[j] = f->mobile[j] == 1 ? asked : 0;
         f->withheld[j] = f->mobile[j] == 1 ? 0 : asked;
     }
-    if (f->potential)
-        BY_DIM(continuity, f, mesh, v, p, f->potential);
+    if (f->potential || f->share)
+        BY_DIM(continuity, f, mesh, v, p, f->potential, f->share);
     else
-        BY_DIM(continuity, f, mesh, v, p, NULL);
+        BY_DIM(continuity, f, mesh, v, p, NULL, NULL);
 }
 
 KERNEL projection(const int D, silt_fluid *f, const silt_mesh *mesh, const double *p, const double *potential) {
@@ -228,29 +229,38 @@ void silt_assemble_projection(silt_fluid *f, const silt_mesh *mesh, const double
         BY_DIM(projection, f, mesh, p, NULL);
 }
 
-KERNEL divergence(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, double *out) {
+KERNEL divergence(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, const double *shares,
+                  double *out) {
     memset(out, 0, (size_t)f->n_node * sizeof(double));
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        const double *flux = f->flux + (D + 1) * D * e, *share = f->share ? f->share + (D + 1) * e : NULL;
-        double sum = 0, carried[3] = {0}, slope[3] = {0};
+        const double *share = shares ? shares + (D + 1) * e : NULL;
+        double g[4][3], u[4][3], sum = 0, along[3] = {0};
+        cell_flux(D, f, e, g);
+        cell_nodal(D, v, cell, u);
         for (int a = 0; a <= D; a++)
             for (int d = 0; d < D; d++) {
-                sum += v[D * cell[a] + d] * flux[D * a + d];
-                slope[d] += p[cell[a]] * flux[D * a + d];
-                if (share)
-                    carried[d] += share[a] * v[D * cell[a] + d];
+                sum += u[a][d] * g[a][d];
+                along[d] += p[cell[a]] * g[a][d];
             }
-        const double weight = f->tau[e] * f->inverse[e];
+        sum *= 1.0 / (D + 1);
+        for (int d = 0; d < D; d++) {
+            along[d] *= f->tau[e] * f->inverse[e];
+            for (int a = 0; a <= D && shares; a++)
+                along[d] += share[a] * u[a][d];
+        }
         for (int a = 0; a <= D; a++) {
-            double gain = sum / (D + 1);
+            double gain = sum;
             for (int d = 0; d < D; d++)
-                gain += flux[D * a + d] * (weight * slope[d] + carried[d]);
+                gain += g[a][d] * along[d];
             out[cell[a]] += gain;
         }
     }
 }
 
 void silt_assemble_divergence(const silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, double *out) {
-    BY_DIM(divergence, f, mesh, v, p, out);
+    if (f->share)
+        BY_DIM(divergence, f, mesh, v, p, f->share, out);
+    else
+        BY_DIM(divergence, f, mesh, v, p, NULL, out);
 }
