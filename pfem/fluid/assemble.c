@@ -9,6 +9,16 @@ KERNEL cell_flux(const int D, const silt_fluid *f, int e, double g[4][3]) {
             g[a][d] = f->flux[((D + 1) * e + a) * D + d];
 }
 
+// The V grad N_a of a cell add up to nought: sums over its nodes are sums over all but the first, of differences from the first.
+// A quarter to a third less to multiply.
+KERNEL cell_slope(const int D, double g[4][3], const double p[4], double slope[3]) {
+    for (int d = 0; d < D; d++) {
+        slope[d] = (p[1] - p[0]) * g[1][d];
+        for (int a = 2; a <= D; a++)
+            slope[d] += (p[a] - p[0]) * g[a][d];
+    }
+}
+
 KERNEL cell_nodal(const int D, const double *x, const int *cell, double v[4][3]) {
     for (int a = 0; a <= D; a++)
         for (int d = 0; d < D; d++)
@@ -69,9 +79,9 @@ KERNEL viscous(const int D, const silt_fluid *f, const silt_mesh *mesh, const do
         cell_nodal(D, v, cell, u);
         for (int d = 0; d < D; d++)
             for (int k = 0; k < D; k++) {
-                l[d][k] = u[0][d] * g[0][k];
-                for (int a = 1; a <= D; a++)
-                    l[d][k] += u[a][d] * g[a][k];
+                l[d][k] = (u[1][d] - u[0][d]) * g[1][k];
+                for (int a = 2; a <= D; a++)
+                    l[d][k] += (u[a][d] - u[0][d]) * g[a][k];
             }
         for (int d = 0; d < D; d++)
             trace += l[d][d];
@@ -79,13 +89,17 @@ KERNEL viscous(const int D, const silt_fluid *f, const silt_mesh *mesh, const do
         for (int d = 0; d < D; d++)
             for (int k = 0; k <= d; k++)
                 stress[d][k] = stress[k][d] = force * (l[d][k] + l[k][d] - (d == k ? 2.0 / 3 * trace : 0));
-        for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++) {
+        for (int d = 0; d < D; d++) {
+            double rest = 0;
+            for (int a = 1; a <= D; a++) {
                 double sum = stress[d][0] * g[a][0];
                 for (int k = 1; k < D; k++)
                     sum += stress[d][k] * g[a][k];
                 out[D * cell[a] + d] += sum;
+                rest += sum;
             }
+            out[D * cell[0] + d] -= rest;
+        }
         for (int a = 0; a <= D && diagonal; a++) {
             double square = 0;
             for (int d = 0; d < D; d++)
@@ -147,22 +161,21 @@ KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const doubl
         cell_flux(D, f, e, g);
         cell_nodal(D, v, cell, u);
         cell_nodal(D, f->projection, cell, pi);
-        for (int a = 0; a <= D; a++) {
+        for (int a = 0; a <= D; a++)
             head[a] = p[cell[a]] + (potential ? potential[cell[a]] : 0);
+        cell_slope(D, g, head, stable);
+        for (int a = 1; a <= D; a++)
             for (int d = 0; d < D; d++)
-                divergence += u[a][d] * g[a][d];
-        }
+                divergence += (u[a][d] - u[0][d]) * g[a][d];
         for (int a = 0; a <= D && shares; a++)
             for (int d = 0; d < D; d++)
                 carried[d] += share[a] * u[a][d];
         const double weight = f->tau[e] * f->inverse[e], part = f->cell_volume[e] * (1.0 / (D + 1));
         for (int d = 0; d < D; d++) {
-            double slope = 0, sum = 0;
-            for (int a = 0; a <= D; a++) {
-                slope += head[a] * g[a][d];
+            double sum = 0;
+            for (int a = 0; a <= D; a++)
                 sum += pi[a][d];
-            }
-            stable[d] = weight * (slope + part * sum);
+            stable[d] = weight * (stable[d] + part * sum);
         }
         bool all = true;
         for (int a = 0; a <= D; a++)
@@ -203,13 +216,11 @@ KERNEL projection(const int D, silt_fluid *f, const silt_mesh *mesh, const doubl
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
         const double tau = f->tau[e], weight = tau * f->cell_volume[e];
-        double g[4][3], slope[3] = {0};
+        double g[4][3], head[4], slope[3];
         cell_flux(D, f, e, g);
-        for (int a = 0; a <= D; a++) {
-            const double head = p[cell[a]] + (potential ? potential[cell[a]] : 0);
-            for (int d = 0; d < D; d++)
-                slope[d] += head * g[a][d];
-        }
+        for (int a = 0; a <= D; a++)
+            head[a] = p[cell[a]] + (potential ? potential[cell[a]] : 0);
+        cell_slope(D, g, head, slope);
         for (int a = 0; a <= D; a++) {
             f->projection_weight[cell[a]] += weight;
             for (int d = 0; d < D; d++)
@@ -235,26 +246,30 @@ KERNEL divergence(const int D, const silt_fluid *f, const silt_mesh *mesh, const
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
         const double *share = shares ? shares + (D + 1) * e : NULL;
-        double g[4][3], u[4][3], sum = 0, along[3] = {0};
+        double g[4][3], u[4][3], head[4], sum = 0, along[3];
         cell_flux(D, f, e, g);
         cell_nodal(D, v, cell, u);
         for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++) {
-                sum += u[a][d] * g[a][d];
-                along[d] += p[cell[a]] * g[a][d];
-            }
+            head[a] = p[cell[a]];
+        cell_slope(D, g, head, along);
+        for (int a = 1; a <= D; a++)
+            for (int d = 0; d < D; d++)
+                sum += (u[a][d] - u[0][d]) * g[a][d];
         sum *= 1.0 / (D + 1);
         for (int d = 0; d < D; d++) {
             along[d] *= f->tau[e] * f->inverse[e];
             for (int a = 0; a <= D && shares; a++)
                 along[d] += share[a] * u[a][d];
         }
-        for (int a = 0; a <= D; a++) {
-            double gain = sum;
+        double rest = 0;
+        for (int a = 1; a <= D; a++) {
+            double flow = 0;
             for (int d = 0; d < D; d++)
-                gain += g[a][d] * along[d];
-            out[cell[a]] += gain;
+                flow += g[a][d] * along[d];
+            out[cell[a]] += sum + flow;
+            rest += flow;
         }
+        out[cell[0]] += sum - rest;
     }
 }
 
