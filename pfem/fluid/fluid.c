@@ -166,10 +166,10 @@ static void find_excess(silt_fluid *f, const silt_step *s, double stiff, const d
 // force on the nodes but for inertia, viscosity and drag's own share: M v/(theta dt) + M g + push + G p
 static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, double *out) {
     const int D = f->dim;
-    const double theta_dt = f->theta * s->dt, *v = s->nodes->v, *g = s->scene->gravity;
+    const double per_time = 1 / (f->theta * s->dt), *v = s->nodes->v, *g = s->scene->gravity;
     for (int i = 0; i < f->n_node; i++)
         for (int d = 0; d < D; d++)
-            out[D * i + d] = f->mass[i] * (v[D * i + d] / theta_dt + g[d]) + (s->drag ? s->drag->push[D * i + d] : 0);
+            out[D * i + d] = f->mass[i] * (v[D * i + d] * per_time + g[d]) + (s->drag ? s->drag->push[D * i + d] : 0);
     if (s->scene->fluid.force.kind != FORMULA_NONE)
         for (int i = 0; i < f->n_node; i++) {
             double a[3];
@@ -511,10 +511,11 @@ static double swirl(const silt_fluid *f, const silt_step *s) {
 // ones, or still water starts to swirl. @return what to multiply it by
 static double strictness(const silt_fluid *f, const silt_step *s) {
     const double h = s->scene->fluid.size;
-    double fastest = sqrt(h * silt_length(3, s->scene->gravity));
+    double square = h * silt_length(3, s->scene->gravity);
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i])
-            fastest = silt_max(fastest, silt_length(f->dim, s->nodes->v + f->dim * i));
+            square = silt_max(square, silt_dot(f->dim, s->nodes->v + f->dim * i, s->nodes->v + f->dim * i));
+    const double fastest = sqrt(square);
     const double least = silt_clamp(1e-12 / s->scene->fluid.tolerance, 0.01, 1); // rounding
     return fastest > 0 && !f->last_try ? silt_clamp(s->dt * fastest / (0.5 * h), least, 1) : 1;
 }

@@ -10,27 +10,22 @@ void silt_momentum_look(silt_fluid *f, const silt_mesh *mesh, const double *v) {
     silt_assemble_viscous_both(f, mesh, v, f->scratch, f->increment);
 }
 
-// With the diagonal D of A = inertia + K, v + D^-1 r leaves the residual (D - A) D^-1 r. In the norm of D^-1 that is at most this
-// times r: K and its diagonal are positive, and a cell's w K w = mu V (L:L + L:L^T - 2/3 tr^2) <= 2 mu V L:L is no more than
-// 2 (dim + 1)/(1 + 4/(3 dim)) times what the cell has in the diagonal.
-static double jacobi_bound(const silt_fluid *f) {
-    double most = 0;
-    for (int i = 0; i < f->n_node; i++)
-        most = silt_max(most, (f->increment[i] - f->inertia[i]) / f->increment[i]);
-    return 2 * (f->dim + 1) / (1 + 4.0 / (3 * f->dim)) * most;
-}
-
 typedef struct silt_descent {
     double rz, size, target, strict; // r . z, r . D^-1 r, where that may stop, and where all is solved
+    double bound;                    // what a step along D^-1 r leaves of r, at most
     int iterations;
 } silt_descent;
 
-// residual of v, from what silt_momentum_look left; first direction; what to reach
+// Residual of v, from what silt_momentum_look left; first direction; what to reach; the bound. With the diagonal D of A = inertia + K,
+// v + D^-1 r leaves the residual (D - A) D^-1 r. In the norm of D^-1 that is at most the bound times r: K and its diagonal are
+// positive, and a cell's w K w = mu V (L:L + L:L^T - 2/3 tr^2) <= 2 mu V L:L is no more than 2 (dim + 1)/(1 + 4/(3 dim)) times what
+// the cell has in the diagonal.
 KERNEL begin(const int D, silt_fluid *f, const double *right, const double *v, double share, double drop, silt_descent *c) {
-    double *r = f->cg[0], *s = f->cg[1], scale = 0, whole = 0, rz = 0;
+    double *r = f->cg[0], *s = f->cg[1], scale = 0, whole = 0, rz = 0, most = 0;
     for (int i = 0; i < f->n_node; i++) {
         const double per = 1 / f->increment[i];
         double loose[3];
+        most = silt_max(most, (f->increment[i] - f->inertia[i]) * per);
         for (int d = 0; d < D; d++) {
             const int k = D * i + d;
             loose[d] = right[k];
@@ -50,6 +45,7 @@ KERNEL begin(const int D, silt_fluid *f, const double *right, const double *v, d
     c->strict = silt_max(silt_square(share) * scale, 1e-30 * whole);
     c->target = silt_max(c->strict, silt_square(drop) * rz);
     c->rz = c->size = rz;
+    c->bound = 2 * (D + 1) / (1 + 4.0 / (3 * D)) * most;
 }
 
 // as = A s. @return s . A s
@@ -102,7 +98,6 @@ static inline __attribute__((always_inline)) silt_status solve(const int D, silt
     const int n = f->n_node;
     const bool factored = silt_stiff_ready(f->stiff, false);
     double *r = f->cg[0], *s = f->cg[1], *z = factored ? f->scratch : NULL;
-    const double bound = factored ? HUGE_VAL : jacobi_bound(f);
     silt_descent c = {0};
     begin(D, f, right, v, silt_clamp(1e-6 * step->scene->fluid.tolerance, 1e-12, 1e-9), drop, &c);
     if (factored && c.size > c.target) {
@@ -113,11 +108,11 @@ static inline __attribute__((always_inline)) silt_status solve(const int D, silt
         if (++c.iterations > MOMENTUM_LIMIT)
             return silt_fail(err, SILT_FAILED, "the momentum system did not converge in %d iterations (%d nodes)", MOMENTUM_LIMIT, n);
         // the last step needs no product where viscosity is small: that it is enough is known beforehand
-        if (silt_square(bound) * c.size <= c.target) {
+        if (!factored && silt_square(c.bound) * c.size <= c.target) {
             for (int i = 0; i < n; i++)
                 for (int d = 0; d < D; d++)
                     v[D * i + d] += r[D * i + d] / f->increment[i];
-            c.size *= silt_square(bound);
+            c.size *= silt_square(c.bound);
             break;
         }
         advance(D, f, c.rz / along(D, f, step->mesh), v, &c);
