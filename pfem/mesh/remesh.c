@@ -358,6 +358,12 @@ static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, c
     free(found);
     free(live);
     free(x);
+    if (!failed) {
+        int(*sorted)[4] = silt_alloc((size_t)kept + 1, sizeof *sorted);
+        silt_cells_sort(n, kept, *cells, sorted);
+        free(*cells);
+        *cells = sorted;
+    }
     return failed ? silt_fail(err, SILT_FAILED, "no memory for the triangulation of %d nodes", m) : SILT_OK;
 }
 
