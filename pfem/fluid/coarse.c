@@ -14,7 +14,7 @@ typedef struct silt_level {
     int *own_start, *own_index;   // owned
     int *diagonal;                // owned, where it stands in the row
     double *exact;                // owned, entries of a coarser level while the hierarchy is made
-    float *value, *inverse;       // owned, entries; 1/diagonal
+    float *value, *inverse;       // owned, entries, 0 on the diagonal; 1/diagonal
     int *to_start, *to;           // owned, rows of the prolongation
     float *weight;                // owned
     float *x, *right;             // owned
@@ -78,6 +78,7 @@ static bool level_copy(silt_level *a, const double *value) {
         if (!(value[k] > 0) || !isfinite(value[k]))
             return false;
         a->inverse[i] = (float)(1 / value[k]);
+        a->value[k] = 0;
     }
     return true;
 }
@@ -320,33 +321,25 @@ static void go_up(const silt_level *a, const float *coarse) {
             a->x[i] += a->weight[m] * coarse[a->to[m]];
     for (int i = a->n - 1; i >= 0; i--) {
         float sum = a->right[i];
-        for (int k = a->start[i]; k < a->diagonal[i]; k++)
-            sum -= a->value[k] * a->x[a->index[k]];
-        for (int k = a->diagonal[i] + 1; k < a->start[i + 1]; k++)
+        for (int k = a->start[i]; k < a->start[i + 1]; k++)
             sum -= a->value[k] * a->x[a->index[k]];
         a->x[i] = sum * a->inverse[i];
     }
 }
 
-bool silt_coarse_apply(silt_coarse *c, const double *right, double *out) {
-    silt_level *top = &c->level[0], *last = &c->level[c->n_level - 1];
-    double most = 0;
-    for (int i = 0; i < top->n; i++)
-        most = silt_max(most, fabs(right[i]));
-    const double scale = most > 0 ? most : 1; // so that squares of any unit fit
-    for (int i = 0; i < top->n; i++)
-        top->right[i] = (float)(right[i] / scale);
+float *silt_coarse_right(silt_coarse *c) { return c->level[0].right; }
+
+const float *silt_coarse_cycle(silt_coarse *c) {
+    silt_level *top = c->level, *last = &c->level[c->n_level - 1];
     for (silt_level *a = top; a < last; a++)
         go_down(a, a[1].right);
     for (int i = 0; i < last->n; i++)
         c->work[i] = last->right[i];
     if (!silt_factor_solve(&c->factor, c->work, c->work))
-        return false;
+        return NULL;
     for (int i = 0; i < last->n; i++)
         last->x[i] = (float)c->work[i];
     for (silt_level *a = last - 1; a >= top; a--)
         go_up(a, a[1].x);
-    for (int i = 0; i < top->n; i++)
-        out[i] = scale * top->x[i];
-    return true;
+    return top->x;
 }

@@ -14,8 +14,10 @@ typedef struct silt_coarse silt_coarse;
 /** Levels for a matrix given by whole rows, the diagonal included, columns rising; made at first (*coarse NULL).
  * @param start, index  borrowed until the next build. @return false when the matrix is not positive definite */
 bool silt_coarse_build(silt_coarse **coarse, int n, const int *start, const int *index, const double *value);
-/** out = one cycle on right. @return false when the coarsest level could not be solved */
-bool silt_coarse_apply(silt_coarse *coarse, const double *right, double *out);
+/** the right side of the next cycle, to be written: n numbers, of any size that single precision knows the squares of */
+float *silt_coarse_right(silt_coarse *coarse);
+/** one cycle. @return its result, n numbers, until the next cycle; NULL when the coarsest level could not be solved */
+const float *silt_coarse_cycle(silt_coarse *coarse);
 void silt_coarse_free(silt_coarse **coarse);
 
 #endif

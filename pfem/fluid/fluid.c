@@ -302,7 +302,7 @@ static silt_status pressure_increment(silt_fluid *f, const silt_step *s, double 
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
     tolerance = silt_min(tolerance, FLUID_INNER * s->scene->fluid.tolerance);
-    SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, s, f->residual, tolerance, f->increment, err));
+    SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, f->residual, tolerance, f->increment, err));
     return status;
 }
 

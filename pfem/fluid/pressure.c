@@ -12,6 +12,7 @@ typedef struct silt_system {
 struct silt_pressure {
     silt_system main, stiff;   // S + L or its Laplacian counterpart; L and the mass matrix over the viscosity
     silt_space *space;         // owned, S + L in 3-D
+    bool rows;                 // it is that
     int64_t pinned_revision;   // of the mesh that `pinned` belongs to
     int n;
     double *gradient;       // owned, dim per entry, G_ij along the mesh's neighbour lists
@@ -278,10 +279,10 @@ silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_ste
     p->n = s->mesh->n_node;
     if (p->pinned_revision != s->mesh->revision || !p->pinned)
         pin_closed(p, s->mesh);
-    if (f->dim == 3 && s->scene->fluid.pressure == PRESSURE_CONSISTENT)
-        SILT_TRY(silt_space_build(&p->space, f, s, p->pinned, err));
-    else
-        SILT_TRY(factor_main(p, f, s, err));
+    p->rows = f->dim == 3 && s->scene->fluid.pressure == PRESSURE_CONSISTENT;
+    if (p->rows)
+        return silt_space_build(&p->space, f, s, p->pinned, stiff, err);
+    SILT_TRY(factor_main(p, f, s, err));
     return stiff ? factor_stiff(p, f, s, err) : SILT_OK;
 }
 
@@ -291,13 +292,12 @@ static silt_status factor_solve(silt_system *system, const double *right, double
     return SILT_OK;
 }
 
-silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step *s, const double *right, double tolerance,
-                                double *x, silt_error *err) {
-    if (f->dim == 3 && s->scene->fluid.pressure == PRESSURE_CONSISTENT)
-        return silt_space_solve(p->space, f, s->mesh, right, tolerance, x, err);
+silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const double *right, double tolerance, double *x, silt_error *err) {
+    if (p->rows)
+        return silt_space_solve(p->space, right, tolerance, x, &f->pressure_iterations, err);
     return factor_solve(&p->main, right, x, err);
 }
 
 silt_status silt_pressure_solve_stiff(silt_pressure *p, const double *right, double *increment, silt_error *err) {
-    return factor_solve(&p->stiff, right, increment, err);
+    return p->rows ? silt_space_solve_stiff(p->space, right, increment, err) : factor_solve(&p->stiff, right, increment, err);
 }
