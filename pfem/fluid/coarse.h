@@ -12,7 +12,7 @@
 typedef struct silt_coarse silt_coarse;
 
 /** Levels for a matrix given by whole rows, the diagonal included, columns rising; made at first (*coarse NULL).
- * @param start, index  borrowed until the next build. @return false when the matrix is not positive definite */
+ * @param start, index  borrowed until the next build. @return false when a diagonal is not positive or the coarsest level has no factor */
 bool silt_coarse_build(silt_coarse **coarse, int n, const int *start, const int *index, const double *value);
 /** the right side of the next cycle, to be written: n numbers, of any size that single precision knows the squares of */
 float *silt_coarse_right(silt_coarse *coarse);

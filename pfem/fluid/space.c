@@ -238,6 +238,8 @@ static silt_status iterate(silt_space *q, matrix apply, silt_coarse *coarse, con
         if (!z)
             return silt_fail(err, SILT_FAILED, "the pressure system could not be solved (%d nodes)", n);
         const double rz = dot(n, r, z);
+        if (rz < 0)
+            return silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite (%d nodes)", n);
         if (k == 0)
             target = silt_square(tolerance) * rz;
         if (!(rz > target))
