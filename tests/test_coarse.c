@@ -1,4 +1,5 @@
-// multigrid as a preconditioner: symmetric, positive definite, exact where it is a factor, as good on a fine lattice as on a coarse one
+// multigrid as a preconditioner: symmetric, positive definite, exact where it is a factor, as good on a fine lattice as
+// on a coarse one
 #include "coarse.h"
 
 #include <setjmp.h>
@@ -13,7 +14,8 @@ typedef struct lattice {
 
 static lattice lattice_make(int m, double apart) {
     const int n = m * m * m, step[3] = {1, m, m * m};
-    lattice a = {n, silt_alloc((size_t)n + 1, sizeof(int)), silt_alloc((size_t)n * 7, sizeof(int)), silt_alloc((size_t)n * 7, sizeof(double))};
+    lattice a = {n, silt_alloc((size_t)n + 1, sizeof(int)), silt_alloc((size_t)n * 7, sizeof(int)),
+                 silt_alloc((size_t)n * 7, sizeof(double))};
     int filled = 0;
     for (int i = 0; i < n; i++) {
         const int at[3] = {i % m, i / m % m, i / (m * m)};
@@ -108,8 +110,8 @@ static void test_symmetric(void **unused) {
     lattice a = lattice_make(16, 1);
     silt_coarse *c = NULL;
     assert_true(silt_coarse_build(&c, a.n, a.start, a.index, a.value));
-    double *x = silt_alloc((size_t)a.n, sizeof *x), *y = silt_alloc((size_t)a.n, sizeof *y), *mx = silt_alloc((size_t)a.n, sizeof *mx),
-           *my = silt_alloc((size_t)a.n, sizeof *my);
+    double *x = silt_alloc((size_t)a.n, sizeof *x), *y = silt_alloc((size_t)a.n, sizeof *y),
+           *mx = silt_alloc((size_t)a.n, sizeof *mx), *my = silt_alloc((size_t)a.n, sizeof *my);
     uint64_t state = 1;
     for (int i = 0; i < a.n; i++) {
         x[i] = silt_uniform(&state) - 0.5;
@@ -140,7 +142,8 @@ static void test_iterations(void **unused) {
             silt_coarse *c = NULL;
             assert_true(silt_coarse_build(&c, a.n, a.start, a.index, a.value));
             const int iterations = solve(c, &a);
-            print_message("%d nodes, links along x %d times the others: %d iterations\n", a.n, stretched ? 100 : 1, iterations);
+            print_message("%d nodes, links along x %d times the others: %d iterations\n", a.n, stretched ? 100 : 1,
+                          iterations);
             assert_in_range(iterations, 1, k == 0 ? 2 : 20);
             silt_coarse_free(&c);
             lattice_free(&a);

@@ -5,29 +5,29 @@
 #define COARSE_LEVELS 12
 #define COARSE_DIRECT 400  // rows that a factor takes
 #define COARSE_STRONG 0.25 // of the largest entry beside the diagonal: neighbours that are aggregated with each other
-#define COARSE_OMEGA (4.0 / 3)
+#define COARSE_OMEGA  (4.0 / 3)
 
 /** a matrix, and how it follows from the next coarser one */
 typedef struct silt_level {
     int n, n_coarse;
-    const int *start, *index;     // rows; borrowed on the finest level
-    int *own_start, *own_index;   // owned
-    int *diagonal;                // owned, where it stands in the row
-    double *exact;                // owned, entries of a coarser level while the hierarchy is made
-    float *value, *inverse;       // owned, entries, 0 on the diagonal; 1/diagonal
-    int *to_start, *to;           // owned, rows of the prolongation
-    float *weight;                // owned
-    float *x, *right;             // owned
-    int start_capacity, index_capacity, diagonal_capacity, exact_capacity, value_capacity, inverse_capacity, to_start_capacity,
-        to_capacity, weight_capacity, x_capacity, right_capacity;
+    const int *start, *index;   // rows; borrowed on the finest level
+    int *own_start, *own_index; // owned
+    int *diagonal;              // owned, where it stands in the row
+    double *exact;              // owned, entries of a coarser level while the hierarchy is made
+    float *value, *inverse;     // owned, entries, 0 on the diagonal; 1/diagonal
+    int *to_start, *to;         // owned, rows of the prolongation
+    float *weight;              // owned
+    float *x, *right;           // owned
+    int start_capacity, index_capacity, diagonal_capacity, exact_capacity, value_capacity, inverse_capacity,
+        to_start_capacity, to_capacity, weight_capacity, x_capacity, right_capacity;
 } silt_level;
 
 struct silt_coarse {
     int n_level;
     silt_level level[COARSE_LEVELS];
-    silt_factor factor;     // owned, of the coarsest level
-    double *work;           // owned, for its solution
-    int *group, *mark;      // owned, aggregates of the level at hand
+    silt_factor factor; // owned, of the coarsest level
+    double *work;       // owned, for its solution
+    int *group, *mark;  // owned, aggregates of the level at hand
     double *strongest, *row;
     int work_capacity, group_capacity, mark_capacity, strongest_capacity, row_capacity;
 };
@@ -87,8 +87,8 @@ static bool strong(const silt_coarse *c, const double *value, int i, int j, int 
     return i != j && -value[k] > 0 && -value[k] >= COARSE_STRONG * silt_min(c->strongest[i], c->strongest[j]);
 }
 
-// greedy: a node whose strong neighbours are all free takes them, then the rest joins its strongest neighbour that was taken.
-// Nodes without strong neighbours have no aggregate: the sweeps solve them. @return how many
+// greedy: a node whose strong neighbours are all free takes them, then the rest joins its strongest neighbour that was
+// taken. Nodes without strong neighbours have no aggregate: the sweeps solve them. @return how many
 static int aggregate(silt_coarse *c, const silt_level *a, const double *value) {
     int count = 0;
     for (int i = 0; i < a->n; i++) {
@@ -124,8 +124,8 @@ static int aggregate(silt_coarse *c, const silt_level *a, const double *value) {
     return count;
 }
 
-// Rows of the prolongation: the aggregates' indicator, smoothed by a step of Jacobi on the matrix whose weak entries are lumped onto
-// the diagonal
+// Rows of the prolongation: the aggregates' indicator, smoothed by a step of Jacobi on the matrix whose weak entries
+// are lumped onto the diagonal
 static void prolongation(silt_coarse *c, silt_level *a, const double *value) {
     SILT_RESERVE(a->to_start, a->to_start_capacity, a->n + 1);
     for (int g = 0; g < a->n_coarse; g++)
@@ -211,7 +211,8 @@ static void transpose(const silt_level *a, int *start, int *row, int *entry) {
 static void galerkin(silt_coarse *c, const silt_level *a, const double *value, silt_level *b) {
     const int filled_to = a->to_start[a->n];
     product q = multiply(c, a, value);
-    int *start = silt_alloc((size_t)a->n_coarse + 2, sizeof *start), *row = silt_alloc((size_t)filled_to + 1, sizeof *row),
+    int *start = silt_alloc((size_t)a->n_coarse + 2, sizeof *start),
+        *row = silt_alloc((size_t)filled_to + 1, sizeof *row),
         *entry = silt_alloc((size_t)filled_to + 1, sizeof *entry);
     transpose(a, start, row, entry);
     b->n = a->n_coarse;
@@ -327,7 +328,9 @@ static void go_up(const silt_level *a, const float *coarse) {
     }
 }
 
-float *silt_coarse_right(silt_coarse *c) { return c->level[0].right; }
+float *silt_coarse_right(silt_coarse *c) {
+    return c->level[0].right;
+}
 
 const float *silt_coarse_cycle(silt_coarse *c) {
     silt_level *top = c->level, *last = &c->level[c->n_level - 1];

@@ -1,8 +1,8 @@
 /** @file fluid.h
  * One step of the water: momentum, pressure, correction on the midpoint mesh (docs/method.md, "Fluid"), in 2-D and 3-D.
  * Rooms: fluid.c the step, hold.c what surroundings hold, assemble.c integrals over cells, tension.c the surface's pull,
- * momentum.c the viscous system,
- * pressure.c the pressure system, space.c and coarse.c that of 3-D, stiff.c both at once where viscosity is stiff, debt.c volume that is owed and water that cannot keep its volume.
+ * momentum.c the viscous system, pressure.c the pressure system, space.c and coarse.c that of 3-D, stiff.c both at once where
+ * viscosity is stiff, debt.c volume that is owed and water that cannot keep its volume.
  */
 #ifndef SILT_FLUID_H
 #define SILT_FLUID_H

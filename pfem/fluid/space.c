@@ -1,30 +1,31 @@
-// The pressure system in 3-D. (S + L) x = N^T N x + L x + extra x with N_ij = P_i G_ij / sqrt(inertia_i), held along the
-// mesh's neighbour lists in single precision. Both parts act on differences x_j - x_i, so that a constant passes exactly, and N
-// besides on x_i by its row sum, which is nought but on the boundary: whatever is rounded, the operator stays symmetric and
-// positive semi-definite. Single precision bounds the accuracy of the increment, not that of the step's iteration.
+// The pressure system in 3-D. (S + L) x = N^T N x + L x + extra x with N_ij = P_i G_ij / sqrt(inertia_i), held along
+// the mesh's neighbour lists in single precision. Both parts act on differences x_j - x_i, so that a constant passes
+// exactly, and N besides on x_i by its row sum, which is nought but on the boundary: whatever is rounded, the operator
+// stays symmetric and positive semi-definite. Single precision bounds the accuracy of the increment, not that of the
+// step's iteration.
 #include "space.h"
 #include "coarse.h"
 
-#define CG_LIMIT 400
+#define CG_LIMIT    400
 #define SPACE_STIFF 1e-3 // of the viscous part of an increment, which others mend
 
 typedef float four __attribute__((vector_size(16))); // N_ij and L_ij of a node and its neighbour
 
 struct silt_space {
     int n;
-    const silt_mesh *mesh;      // borrowed, whose neighbour lists these are
-    four *entry;                // owned, along the mesh's neighbour lists, 0 for the node itself
-    four *sum;                  // owned, per node: of N along its row
-    double *compact;            // owned, the same way, the preconditioner's matrix
-    double *stiff;              // owned, the same way, L and what stands for viscosity; only where that is stiff
-    double *extra;              // owned, per node: what pins closed water, on the diagonal
-    double *weight;             // owned, per cell: of L, and of L and S's Laplacian
-    int *place;                 // owned, per node: where it stands among the neighbours of the node at hand
-    double *r, *ad;             // owned, per node, of conjugate gradients
-    float *d;                   // owned, the same: whatever is rounded in a direction, x and r go along the same one
+    const silt_mesh *mesh; // borrowed, whose neighbour lists these are
+    four *entry;           // owned, along the mesh's neighbour lists, 0 for the node itself
+    four *sum;             // owned, per node: of N along its row
+    double *compact;       // owned, the same way, the preconditioner's matrix
+    double *stiff;         // owned, the same way, L and what stands for viscosity; only where that is stiff
+    double *extra;         // owned, per node: what pins closed water, on the diagonal
+    double *weight;        // owned, per cell: of L, and of L and S's Laplacian
+    int *place;            // owned, per node: where it stands among the neighbours of the node at hand
+    double *r, *ad;        // owned, per node, of conjugate gradients
+    float *d;              // owned, the same: whatever is rounded in a direction, x and r go along the same one
     silt_coarse *coarse, *coarse_stiff; // owned
-    int stiff_capacity, entry_capacity, sum_capacity, compact_capacity, extra_capacity, weight_capacity, place_capacity, r_capacity, ad_capacity,
-        d_capacity;
+    int stiff_capacity, entry_capacity, sum_capacity, compact_capacity, extra_capacity, weight_capacity, place_capacity,
+        r_capacity, ad_capacity, d_capacity;
 };
 
 void silt_space_free(silt_space **space) {
@@ -60,7 +61,8 @@ static void weigh_cells(silt_space *q, const silt_fluid *f, const silt_mesh *mes
 }
 
 // one row of G, L and the compact Laplacian, from the cells of the node
-static void row_gather(const silt_space *q, const silt_fluid *f, const silt_mesh *mesh, int i, double (*row)[4], double *compact) {
+static void row_gather(const silt_space *q, const silt_fluid *f, const silt_mesh *mesh, int i, double (*row)[4],
+                       double *compact) {
     for (int k = mesh->node_cell_start[i]; k < mesh->node_cell_start[i + 1]; k++) {
         const int e = mesh->node_cell[k], *cell = mesh->cell[e];
         const double *flux = f->flux + 12 * e;
@@ -79,8 +81,8 @@ static void row_gather(const silt_space *q, const silt_fluid *f, const silt_mesh
     }
 }
 
-// Openings with a level give their pressure as the surface does: G carries a constant pressure to nodes on the boundary only, which
-// is how the compact matrix knows of the free surface
+// Openings with a level give their pressure as the surface does: G carries a constant pressure to nodes on the boundary
+// only, which is how the compact matrix knows of the free surface
 static void mark_given(const silt_mesh *mesh, uint8_t *given) {
     memcpy(given, mesh->surface, (size_t)mesh->n_node);
     for (int k = 0; k < mesh->n_facet; k++)
@@ -88,8 +90,8 @@ static void mark_given(const silt_mesh *mesh, uint8_t *given) {
             given[mesh->facet[k][a]] = 1;
 }
 
-// 3/(4 mu) of the lumped mass: what is left of S when viscosity outweighs inertia (a gradient field meets 4/3 mu of the deviatoric
-// stress)
+// 3/(4 mu) of the lumped mass: what is left of S when viscosity outweighs inertia (a gradient field meets 4/3 mu of the
+// deviatoric stress)
 static double fluidity(const silt_fluid *f, const silt_mesh *mesh, int i) {
     double sum = 0;
     for (int k = mesh->node_cell_start[i]; k < mesh->node_cell_start[i + 1]; k++)
@@ -136,8 +138,8 @@ static void rows_build(silt_space *q, const silt_fluid *f, const silt_mesh *mesh
     free(given);
 }
 
-silt_status silt_space_build(silt_space **space, const silt_fluid *f, const silt_step *s, const uint8_t *pinned, bool stiff,
-                             silt_error *err) {
+silt_status silt_space_build(silt_space **space, const silt_fluid *f, const silt_step *s, const uint8_t *pinned,
+                             bool stiff, silt_error *err) {
     if (!*space)
         *space = silt_alloc(1, sizeof **space);
     silt_space *q = *space;
@@ -161,7 +163,8 @@ silt_status silt_space_build(silt_space **space, const silt_fluid *f, const silt
     bool done;
     SILT_CLOCKED(factor, done = silt_coarse_build(&q->coarse, q->n, start, index, q->compact) &&
                                 (!stiff || silt_coarse_build(&q->coarse_stiff, q->n, start, index, q->stiff)));
-    return done ? SILT_OK : silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite (%d nodes)", q->n);
+    return done ? SILT_OK
+                : silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite (%d nodes)", q->n);
 }
 
 // out = (S + L) x, a row's entries from memory once. @return x . out
@@ -222,8 +225,8 @@ static double largest(int n, const double *a) {
 /** out = matrix x. @return x . out */
 typedef double (*matrix)(const silt_space *q, const float *x, double *out);
 
-static silt_status iterate(silt_space *q, matrix apply, silt_coarse *coarse, const double *right, double tolerance, double *x,
-                           int *iterations, silt_error *err) {
+static silt_status iterate(silt_space *q, matrix apply, silt_coarse *coarse, const double *right, double tolerance,
+                           double *x, int *iterations, silt_error *err) {
     const int n = q->n;
     const double scale = largest(n, right);
     double *r = q->r, *ad = q->ad, before = 0, target = 0;
@@ -245,7 +248,8 @@ static silt_status iterate(silt_space *q, matrix apply, silt_coarse *coarse, con
         if (!(rz > target))
             return SILT_OK;
         if (k == CG_LIMIT)
-            return silt_fail(err, SILT_FAILED, "the pressure system did not converge in %d iterations (%d nodes)", CG_LIMIT, n);
+            return silt_fail(err, SILT_FAILED, "the pressure system did not converge in %d iterations (%d nodes)",
+                             CG_LIMIT, n);
         const float beta = k ? (float)(rz / before) : 0;
         for (int i = 0; i < n; i++)
             d[i] = z[i] + beta * d[i];
@@ -264,7 +268,8 @@ static silt_status iterate(silt_space *q, matrix apply, silt_coarse *coarse, con
     }
 }
 
-silt_status silt_space_solve(silt_space *q, const double *right, double tolerance, double *x, int *iterations, silt_error *err) {
+silt_status silt_space_solve(silt_space *q, const double *right, double tolerance, double *x, int *iterations,
+                             silt_error *err) {
     return iterate(q, operator_apply, q->coarse, right, tolerance, x, iterations, err);
 }
 
