@@ -8,6 +8,8 @@
 #define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
+#define FLUID_INNER 1e4     // accuracy of a pressure increment over that of the step, at least: refreshes are counted, so what an
+                            // increment lacks does not all come back
 
 void silt_fluid_clear(silt_fluid *f) {
     double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->start, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
@@ -306,12 +308,13 @@ static void correct(silt_fluid *f, const silt_step *s, const double *q, double *
     }
 }
 
-// increment = -matrix^-1 residual
+// increment = -matrix^-1 residual, in 3-D to `tolerance`, or to what is worth having where the step is solved far
 static silt_status pressure_increment(silt_fluid *f, const silt_step *s, double tolerance, silt_error *err) {
     silt_status status;
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
-    SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, s, f->residual, tolerance, f->increment, err));
+    tolerance = silt_min(tolerance, FLUID_INNER * s->scene->fluid.tolerance);
+    SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, f->residual, tolerance, f->increment, err));
     return status;
 }
 

@@ -1,8 +1,8 @@
 /** @file fluid.h
  * One step of the water: momentum, pressure, correction on the midpoint mesh (docs/method.md, "Fluid"), in 2-D and 3-D.
- * Rooms: fluid.c the step, hold.c what surroundings hold, geometry.c shapes of the cells, assemble.c integrals over them, tension.c the surface's pull,
- * momentum.c the viscous system,
- * pressure.c the pressure system, stiff.c both at once where viscosity is stiff, debt.c volume that is owed and water that cannot keep its volume.
+ * Rooms: fluid.c the step, hold.c what surroundings hold, geometry.c shapes of the cells, assemble.c integrals over them,
+ * tension.c the surface's pull, momentum.c the viscous system, pressure.c the pressure system, space.c and coarse.c that of 3-D,
+ * stiff.c both at once where viscosity is stiff, debt.c volume that is owed and water that cannot keep its volume.
  */
 #ifndef SILT_FLUID_H
 #define SILT_FLUID_H
@@ -187,13 +187,13 @@ void silt_mix_next(silt_mix *mix, int dim, int n, const double *change, const do
 // pressure.c ------------------------------------------------------------------------------------------
 silt_pressure *silt_pressure_create(void);
 void silt_pressure_free(silt_pressure **pressure);
-/** Assembles and factors  sum_i G_i^T P_i G_i / inertia_i + L  (consistent) or its Laplacian counterpart; where that is too
- * dear (3-D) a compact matrix like it, which then preconditions conjugate gradients.
+/** Assembles  sum_i G_i^T P_i G_i / inertia_i + L  (consistent) or its Laplacian counterpart, and factors it; in 3-D the first is
+ * left to conjugate gradients (space.c).
  * stiff: the viscous counterpart is wanted too. Errors: SILT_FAILED when the matrix is not positive definite. */
 silt_status silt_pressure_factor(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, bool stiff, silt_error *err);
-/** increment = matrix^-1 right; iterations stop at `tolerance` relative to the right side */
-silt_status silt_pressure_solve(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, const double *right,
-                                double tolerance, double *increment, silt_error *err);
+/** increment = matrix^-1 right; conjugate gradients stop at `tolerance` relative to the right side. The mesh is that of the factor. */
+silt_status silt_pressure_solve(silt_pressure *pressure, silt_fluid *fluid, const double *right, double tolerance,
+                                double *increment, silt_error *err);
 /** increment = (3/(4 mu) M + L)^-1 right: the pressure's operator where viscosity outweighs inertia */
 silt_status silt_pressure_solve_stiff(silt_pressure *pressure, const double *right, double *increment, silt_error *err);
 /** forgets factors, so that a resumed run and one that went on hold the same */
