@@ -1,28 +1,30 @@
-// the pressure system. 2-D: assembled row by row from the node's gradients, factored by CHOLMOD. 3-D: conjugate gradients on
-// the same operator, applied cell by cell, preconditioned by the factor of a compact Laplacian that resembles it
+// the pressure system. 2-D: summed over the nodes' stars, front by front. 3-D: conjugate gradients on the same operator, applied
+// cell by cell, preconditioned by the factor of a compact Laplacian that resembles it
 #include "factor.h"
 #include "fluid.h"
+#include "front.h"
 
-/** a symmetric matrix and its factor */
+/** a symmetric matrix over nodes and their neighbours, and its factor */
 typedef struct silt_system {
     silt_factor factor;     // owned
     int64_t revision;       // of the mesh that the pattern belongs to
-    bool compact;           // neighbours only, not nodes at distance two
 } silt_system;
 
 struct silt_pressure {
-    silt_system main, stiff;   // S + L or a compact stand-in; L and the mass matrix over the viscosity
+    silt_system main, stiff;   // a compact stand-in for S + L; L and the mass matrix over the viscosity
+    silt_front *front;         // owned, S + L in 2-D
+    int64_t front_revision;    // of the mesh that its order belongs to
+    bool compact;              // main is in use, not front
     int n;
-    double *gradient;       // owned, dim per entry, G_ij along the mesh's neighbour lists
-    int *mirror;            // owned, index of (j, i) for the entry (i, j)
-    int *place;             // owned, (dim + 1)^2 per cell: where (i, j) stands in the neighbour lists
+    double *gradient;       // owned, 2 per entry of the mesh's neighbour lists: rows of G, free part, over the root of the inertia
+    double *weight;         // owned, per cell, of the stabilisation
     uint8_t *pinned;        // owned, one per node: the pressure level of a closed piece of water
     double *row;            // owned
     double *extra;          // owned, per node: what pins closed water, added to the operator's diagonal
     double *cg[4], *work;   // owned, conjugate gradients: 1 per node; dim per node
     int cg_capacity[4], work_capacity, extra_capacity;
-    int *mark, *list;       // owned
-    int gradient_capacity, mirror_capacity, place_capacity, pinned_capacity, row_capacity, mark_capacity, list_capacity;
+    int *group;             // owned, per node
+    int gradient_capacity, weight_capacity, pinned_capacity, row_capacity, group_capacity;
 };
 
 silt_pressure *silt_pressure_create(void) { return silt_alloc(1, sizeof(silt_pressure)); }
@@ -32,6 +34,7 @@ void silt_pressure_forget(silt_pressure *pressure) {
         return;
     silt_factor_clear(&pressure->main.factor);
     silt_factor_clear(&pressure->stiff.factor);
+    silt_front_free(&pressure->front);
     pressure->main.revision = pressure->stiff.revision = -1;
 }
 
@@ -41,16 +44,14 @@ void silt_pressure_free(silt_pressure **pressure) {
     silt_pressure *p = *pressure;
     silt_pressure_forget(p);
     free(p->gradient);
-    free(p->mirror);
-    free(p->place);
+    free(p->weight);
     free(p->pinned);
     free(p->row);
     free(p->extra);
     for (int k = 0; k < 4; k++)
         free(p->cg[k]);
     free(p->work);
-    free(p->mark);
-    free(p->list);
+    free(p->group);
     free(p);
     *pressure = NULL;
 }
@@ -58,7 +59,8 @@ void silt_pressure_free(silt_pressure **pressure) {
 // pieces of water without a free surface, or an opening with a level, know their pressure up to a constant: one node each is pinned
 static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     SILT_RESERVE(p->pinned, p->pinned_capacity, mesh->n_node + 1);
-    int *parent = silt_alloc((size_t)mesh->n_node + 1, sizeof *parent);
+    SILT_RESERVE(p->group, p->group_capacity, mesh->n_node + 1);
+    int *parent = p->group;
     for (int i = 0; i < mesh->n_node; i++) {
         parent[i] = i;
         p->pinned[i] = 0;
@@ -74,102 +76,61 @@ static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     for (int k = 0; k < mesh->n_facet; k++)
         if (mesh->facet_kind[k] == FACET_OPEN)
             p->pinned[silt_group_find(parent, mesh->facet[k][0])] = 0;
-    free(parent);
 }
 
-// lower triangle of the matrix, by columns: nodes at distance two, or neighbours only
-static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh *mesh, int D, bool compact) {
-    const int n = mesh->n_node, n_entry = mesh->neighbour_start[n], m = D + 1;
+// lower triangle of the compact matrix, by columns
+static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh *mesh) {
+    const int n = mesh->n_node;
     SILT_RESERVE(p->row, p->row_capacity, n + 1);
-    SILT_RESERVE(p->mark, p->mark_capacity, n + 1);
-    SILT_RESERVE(p->list, p->list_capacity, n + 1);
-    if (!compact) {
-        SILT_RESERVE(p->gradient, p->gradient_capacity, D * n_entry + 1);
-        SILT_RESERVE(p->mirror, p->mirror_capacity, n_entry + 1);
-        SILT_RESERVE(p->place, p->place_capacity, m * m * mesh->n_cell + 1);
-        for (int i = 0; i < n; i++)
-            for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++)
-                p->mirror[k] = silt_neighbour_index(mesh, mesh->neighbour[k], i);
-        for (int e = 0; e < mesh->n_cell; e++)
-            for (int a = 0; a < m; a++)
-                for (int b = 0; b < m; b++)
-                    p->place[m * m * e + m * a + b] = silt_neighbour_index(mesh, mesh->cell[e][a], mesh->cell[e][b]);
+    const int filled = (mesh->neighbour_start[n] + n) / 2; // lists hold the node itself
+    int *start = silt_factor_pattern(&system->factor, n, filled), *index = system->factor.index, at = 0;
+    for (int j = 0; j < n; j++) {
+        start[j] = at;
+        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
+            if (mesh->neighbour[k] >= j)
+                index[at++] = mesh->neighbour[k];
     }
-
-    // count, then fill
-    int *start = silt_alloc((size_t)n + 1, sizeof *start);
-    for (int pass = 0; pass < 2; pass++) {
-        for (int j = 0; j < n; j++)
-            p->mark[j] = -1;
-        int filled = 0;
-        for (int j = 0; j < n; j++) {
-            int count = 0;
-            for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
-                const int i = mesh->neighbour[k];
-                if (compact) {
-                    if (i >= j)
-                        p->list[count++] = i;
-                    continue;
-                }
-                for (int q = mesh->neighbour_start[i]; q < mesh->neighbour_start[i + 1]; q++) {
-                    const int c = mesh->neighbour[q];
-                    if (c >= j && p->mark[c] != j) {
-                        p->mark[c] = j;
-                        p->list[count++] = c;
-                    }
-                }
-            }
-            if (pass) {
-                // insertion sort: rows of a column rise, lists are short
-                for (int a = 1; a < count; a++) {
-                    const int key = p->list[a];
-                    int b = a - 1;
-                    for (; b >= 0 && p->list[b] > key; b--)
-                        p->list[b + 1] = p->list[b];
-                    p->list[b + 1] = key;
-                }
-                memcpy(system->factor.index + filled, p->list, (size_t)count * sizeof(int));
-            }
-            start[j] = filled;
-            filled += count;
-        }
-        start[n] = filled;
-        if (pass == 0)
-            memcpy(silt_factor_pattern(&system->factor, n, filled), start, ((size_t)n + 1) * sizeof *start);
-    }
-    free(start);
-    system->compact = compact;
+    start[n] = at;
     system->revision = mesh->revision;
 }
 
-static void gradient_assemble(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh) {
-    const int D = f->dim, m = D + 1;
-    memset(p->gradient, 0, (size_t)(D * mesh->neighbour_start[mesh->n_node]) * sizeof *p->gradient);
+// what silt_front needs: rows of G and weights of L; the diagonal of their sum in `extra`
+static void rows_assemble(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh) {
+    enum { D = 2, M = 3 };
+    SILT_RESERVE(p->gradient, p->gradient_capacity, D * mesh->neighbour_start[p->n] + 1);
+    SILT_RESERVE(p->weight, p->weight_capacity, mesh->n_cell + 1);
+    SILT_RESERVE(p->group, p->group_capacity, p->n + 1);
+    int *place = p->group; // of a neighbour in the present node's list
     for (int e = 0; e < mesh->n_cell; e++) {
-        const double *flux = f->flux + m * D * e;
-        for (int a = 0; a < m; a++)
-            for (int b = 0; b < m; b++)
-                for (int d = 0; d < D; d++)
-                    p->gradient[D * p->place[m * m * e + m * a + b] + d] +=
-                        flux[D * a + d] / m + (f->share ? f->share[m * e + a] * flux[D * b + d] : 0);
+        const double *flux = f->flux + M * D * e;
+        p->weight[e] = f->tau[e] * f->inverse[e];
+        for (int a = 0; a < M; a++)
+            p->extra[mesh->cell[e][a]] += p->weight[e] * silt_dot(D, flux + D * a, flux + D * a);
     }
-}
-
-// one column of sum_i G_i^T P_i G_i / inertia_i
-static void column_consistent(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh, int j) {
-    const int D = f->dim;
-    for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
-        const int i = mesh->neighbour[k];
-        if (f->hold[i] == HOLD_ALL)
+    for (int i = 0; i < p->n; i++) {
+        const int start = mesh->neighbour_start[i], size = mesh->neighbour_start[i + 1] - start;
+        double *row = p->gradient + D * start;
+        memset(row, 0, (size_t)(D * size) * sizeof *row);
+        if (!mesh->wet[i] || f->hold[i] == HOLD_ALL)
             continue;
-        double g[3];
-        memcpy(g, p->gradient + D * p->mirror[k], (size_t)D * sizeof(double));
-        silt_hold_project(f, i, g);
-        for (int d = 0; d < D; d++)
-            g[d] /= f->inertia[i];
-        for (int m = mesh->neighbour_start[i]; m < mesh->neighbour_start[i + 1]; m++)
+        for (int k = 0; k < size; k++)
+            place[mesh->neighbour[start + k]] = k;
+        for (int k = mesh->node_cell_start[i]; k < mesh->node_cell_start[i + 1]; k++) {
+            const int e = mesh->node_cell[k], *cell = mesh->cell[e], a = cell[0] == i ? 0 : cell[1] == i ? 1 : 2;
+            const double *flux = f->flux + M * D * e, share = f->share ? f->share[M * e + a] : 0;
+            for (int b = 0; b < M; b++)
+                for (int d = 0; d < D; d++)
+                    row[D * place[cell[b]] + d] += flux[D * a + d] / M + share * flux[D * b + d];
+        }
+        const double scale = 1 / sqrt(f->inertia[i]);
+        for (int k = 0; k < size; k++) {
+            double *g = row + D * k;
+            if (f->hold[i] != HOLD_FREE)
+                silt_hold_project(f, i, g);
             for (int d = 0; d < D; d++)
-                p->row[mesh->neighbour[m]] += g[d] * p->gradient[D * m + d];
+                g[d] *= scale;
+            p->extra[mesh->neighbour[start + k]] += silt_dot(D, g, g);
+        }
     }
 }
 
@@ -219,16 +180,20 @@ static void boundary_diagonal(silt_pressure *p, silt_fluid *f, const silt_mesh *
     }
 }
 
-static silt_status system_factor(silt_system *system, const silt_fluid *f, const silt_step *s, bool fresh, silt_error *err) {
+static silt_status not_definite(const silt_step *s, int node, silt_error *err) {
+    const double *x = s->nodes->x + silt_nodes_dim(s->nodes) * node;
+    return silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite near (%g, %g)", x[0], x[1]);
+}
+
+static silt_status system_factor(silt_system *system, const silt_step *s, bool fresh, silt_error *err) {
     bool done;
     if (fresh)
         SILT_CLOCKED(analyse, silt_factor_analyse(&system->factor, FACTOR_DEFINITE, NULL));
     SILT_CLOCKED(factor, done = silt_factor_compute(&system->factor));
     if (done)
         return SILT_OK;
-    const double *x = s->nodes->x + f->dim * system->factor.bad;
     system->revision = -1;
-    return silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite near (%g, %g)", x[0], x[1]);
+    return not_definite(s, system->factor.bad, err);
 }
 
 // 3/(4 mu) of the lumped mass and the stabilisation: what is left of the pressure's operator when viscosity outweighs inertia
@@ -238,7 +203,7 @@ static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step
     silt_system *system = &p->stiff;
     const bool fresh = system->revision != mesh->revision || !system->factor.inside;
     if (fresh)
-        pattern_build(p, system, mesh, f->dim, true);
+        pattern_build(p, system, mesh);
     double *fluidity = f->scratch;
     memset(fluidity, 0, (size_t)p->n * sizeof(double));
     for (int e = 0; e < mesh->n_cell; e++)
@@ -256,57 +221,75 @@ static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step
             p->row[mesh->neighbour[k]] = 0;
         p->row[j] = 0;
     }
-    return system_factor(system, f, s, fresh, err);
+    return system_factor(system, s, fresh, err);
 }
 
-silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
+// what is added to the diagonal at node j: a crumb between held nodes knows its pressure up to a constant too
+static double pin(const silt_pressure *p, const silt_mesh *mesh, int j, double diagonal) {
+    return !mesh->wet[j] ? 1 : p->pinned[j] ? diagonal : 1e-9 * diagonal;
+}
+
+static silt_status factor_compact(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
     const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
-    const bool compact = f->dim == 3 || !consistent;
     silt_system *system = &p->main;
-    const bool fresh = system->revision != mesh->revision || !system->factor.inside || system->compact != compact;
-    p->n = mesh->n_node;
+    const bool fresh = system->revision != mesh->revision || !system->factor.inside;
     if (fresh) {
-        pattern_build(p, system, mesh, f->dim, compact);
+        pattern_build(p, system, mesh);
         pin_closed(p, mesh);
     }
-    SILT_RESERVE(p->extra, p->extra_capacity, p->n + 1);
-    memset(p->extra, 0, (size_t)p->n * sizeof *p->extra);
-    if (!compact)
-        gradient_assemble(p, f, mesh);
-    else if (consistent)
+    if (consistent)
         boundary_diagonal(p, f, mesh);
-
     const int *start = system->factor.start, *index = system->factor.index;
     double *value = system->factor.value;
     memset(p->row, 0, (size_t)p->n * sizeof *p->row);
     for (int j = 0; j < p->n; j++) {
-        if (mesh->wet[j]) {
-            if (!compact)
-                column_consistent(p, f, mesh, j);
-            column_laplacian(p, f, mesh, j, compact);
-        }
+        if (mesh->wet[j])
+            column_laplacian(p, f, mesh, j, true);
         p->row[j] += p->extra[j];
         double *diagonal = &value[start[j]];
         for (int k = start[j]; k < start[j + 1]; k++)
             value[k] = p->row[index[k]];
-        p->extra[j] = p->pinned[j] ? *diagonal : 1e-9 * *diagonal;
-        if (!mesh->wet[j])
-            *diagonal = 1;
-        else
-            *diagonal += p->extra[j]; // a crumb between held nodes knows its pressure up to a constant too
+        p->extra[j] = pin(p, mesh, j, *diagonal);
+        *diagonal = mesh->wet[j] ? *diagonal + p->extra[j] : 1;
         if (!consistent && mesh->surface[j]) // pressure increment prescribed on the free surface
             *diagonal += 1e12 * fabs(*diagonal);
         // clear what this column touched
-        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
-            const int i = mesh->neighbour[k];
-            p->row[i] = 0;
-            for (int m = mesh->neighbour_start[i]; !compact && m < mesh->neighbour_start[i + 1]; m++)
-                p->row[mesh->neighbour[m]] = 0;
-        }
+        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
+            p->row[mesh->neighbour[k]] = 0;
         p->row[j] = 0;
     }
-    SILT_TRY(system_factor(system, f, s, fresh, err));
+    return system_factor(system, s, fresh, err);
+}
+
+static silt_status factor_fronts(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
+    const silt_mesh *mesh = s->mesh;
+    rows_assemble(p, f, mesh);
+    const bool fresh = !p->front || p->front_revision != mesh->revision;
+    if (fresh)
+        pin_closed(p, mesh);
+    for (int j = 0; j < p->n; j++)
+        p->extra[j] = pin(p, mesh, j, p->extra[j]);
+    const silt_front_matrix matrix = {.n = p->n, .neighbour_start = mesh->neighbour_start, .neighbour = mesh->neighbour,
+        .node_cell_start = mesh->node_cell_start, .node_cell = mesh->node_cell, .n_cell = mesh->n_cell,
+        .cell = (const int (*)[4])mesh->cell, .row = p->gradient, .flux = f->flux, .weight = p->weight, .diagonal = p->extra};
+    if (fresh)
+        SILT_CLOCKED(analyse, silt_front_order(&p->front, &matrix, s->nodes->x));
+    p->front_revision = mesh->revision;
+    int bad;
+    SILT_CLOCKED(factor, bad = silt_front_factor(p->front, &matrix));
+    if (bad < 0)
+        return SILT_OK;
+    silt_front_free(&p->front);
+    return not_definite(s, bad, err);
+}
+
+silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
+    p->compact = f->dim == 3 || s->scene->fluid.pressure != PRESSURE_CONSISTENT;
+    p->n = s->mesh->n_node;
+    SILT_RESERVE(p->extra, p->extra_capacity, p->n + 1);
+    memset(p->extra, 0, (size_t)p->n * sizeof *p->extra);
+    SILT_TRY(p->compact ? factor_compact(p, f, s, err) : factor_fronts(p, f, s, err));
     return stiff ? factor_stiff(p, f, s, err) : SILT_OK;
 }
 
@@ -343,7 +326,11 @@ static double dot(int n, const double *a, const double *b) {
 silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step *s, const double *right, double tolerance,
                                 double *x, silt_error *err) {
     const int n = p->n;
-    if (!p->main.compact || s->scene->fluid.pressure != PRESSURE_CONSISTENT)
+    if (!p->compact) {
+        silt_front_solve(p->front, right, x);
+        return SILT_OK;
+    }
+    if (s->scene->fluid.pressure != PRESSURE_CONSISTENT)
         return factor_solve(&p->main, right, x, err);
     for (int k = 0; k < 4; k++)
         SILT_RESERVE(p->cg[k], p->cg_capacity[k], n + 1);

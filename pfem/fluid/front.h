@@ -1,0 +1,33 @@
+/** @file front.h
+ * Direct solution of a symmetric positive definite system whose matrix is a sum over the nodes' stars (a node and its neighbours),
+ * 2-D: nested dissection by place, then fronts (Duff and Reid, ACM Trans. Math. Softw. 9, 1983). The matrix is never put
+ * together: a star goes straight into the front that eliminates the first of its nodes.
+ */
+#ifndef SILT_FRONT_H
+#define SILT_FRONT_H
+
+#include "base.h"
+
+typedef struct silt_front silt_front;
+
+/** What is summed, for nodes with neighbour lists as the mesh has them:
+ * over nodes i, g g^T, twice (row: two numbers per entry of i's list); the diagonal; over cells, weight flux flux^T, twice */
+typedef struct silt_front_matrix {
+    int n, n_cell;
+    const int *neighbour_start, *neighbour, *node_cell_start, *node_cell;
+    const int (*cell)[4];
+    const double *row;      // 2 per neighbour
+    const double *flux;     // 2 per node of a cell
+    const double *weight;   // 1 per cell
+    const double *diagonal; // n
+} silt_front_matrix;
+
+/** The order of elimination and room for the factor. x: places, 2 per node; only the order hangs on them. Makes *front at first. */
+void silt_front_order(silt_front **front, const silt_front_matrix *matrix, const double *x);
+/** @return -1, or a node where the matrix is not positive definite */
+int silt_front_factor(silt_front *front, const silt_front_matrix *matrix);
+/** out = matrix^-1 right, which may be the same array */
+void silt_front_solve(silt_front *front, const double *right, double *out);
+void silt_front_free(silt_front **front);
+
+#endif
