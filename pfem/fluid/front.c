@@ -15,7 +15,8 @@ struct item {
 /** columns that are eliminated together, with the rows below them */
 struct block {
     int begin, end;  // places in the order
-    int n_child;     // that many blocks' updates lie on top of the stack
+    int n_child;     // that many blocks' updates lie on top of the other stack
+    int side;        // stack that its update waits on: parents and children take turns, so that none has to move
     int row_begin, row_end;
     size_t value;    // of the panel (end - begin columns of own and row_end - row_begin entries)
 };
@@ -30,7 +31,7 @@ struct silt_front {
     int *local;             // owned, per place: row in the front; in the dissection: part
     struct item *item;      // owned
     double *value;          // owned, panels, columns one after the other, 1/diagonal in the diagonal's place
-    double *stack;          // owned, updates that wait for their parent
+    double *stack[2];       // owned, updates that wait for their parent
     double *right;          // owned, in the order of elimination
     double **column;        // owned, of the present front
     int *waiting;           // owned, blocks on the stack
@@ -38,7 +39,7 @@ struct silt_front {
     double *part_right;     // owned, the right side's numbers in a front
     int order_capacity, place_capacity, row_capacity, first_capacity, local_capacity, item_capacity, right_capacity, column_capacity,
         waiting_capacity, at_capacity, part_capacity;
-    size_t value_capacity, stack_capacity;
+    size_t value_capacity, stack_capacity[2];
     int widest; // front
     int part;
 };
@@ -53,9 +54,9 @@ static double *room(double *old, size_t *capacity, size_t need) {
 
 // ---------------------------------------------------------------- order
 
-static int block_add(silt_front *f, int begin, int end, int n_child) {
+static int block_add(silt_front *f, int begin, int end, int n_child, int depth) {
     SILT_RESERVE(f->block, f->block_capacity, f->n_block + 1);
-    f->block[f->n_block++] = (struct block){.begin = begin, .end = end, .n_child = n_child};
+    f->block[f->n_block++] = (struct block){.begin = begin, .end = end, .n_child = n_child, .side = depth % 2};
     return 1;
 }
 
@@ -113,10 +114,10 @@ static void separate(silt_front *f, const silt_front_matrix *q, int begin, int e
 }
 
 // orders the items from begin to end. @return how many blocks wait for a parent
-static int dissect(silt_front *f, const silt_front_matrix *q, int begin, int end) {
+static int dissect(silt_front *f, const silt_front_matrix *q, int begin, int end, int depth) {
     const int n = end - begin;
     if (n <= FRONT_LEAF)
-        return n ? block_add(f, begin, end, 0) : 0;
+        return n ? block_add(f, begin, end, 0, depth) : 0;
     double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL}, sum[2] = {0, 0};
     for (int k = begin; k < end; k++)
         for (int d = 0; d < 2; d++) {
@@ -135,7 +136,7 @@ static int dissect(silt_front *f, const silt_front_matrix *q, int begin, int end
         count += side;
     }
     if (count == 0 || count == n)
-        return block_add(f, begin, end, 0);
+        return block_add(f, begin, end, 0, depth);
     separate(f, q, begin, end, axis, cut, low);
     // low side, high side, separator
     int a = begin, b = end, k = begin;
@@ -151,8 +152,9 @@ static int dissect(silt_front *f, const silt_front_matrix *q, int begin, int end
         else
             k++;
     }
-    const int waiting = dissect(f, q, begin, a) + dissect(f, q, a, b);
-    return b < end ? block_add(f, b, end, waiting) : waiting;
+    const int below = depth + (b < end); // without a separator the parts go to this one's parent
+    const int waiting = dissect(f, q, begin, a, below) + dissect(f, q, a, b, below);
+    return b < end ? block_add(f, b, end, waiting, depth) : waiting;
 }
 
 static void sort_rows(int n, int *row) {
@@ -165,7 +167,7 @@ static void sort_rows(int n, int *row) {
     }
 }
 
-// adds places above the block that the mark has not seen. The list stays sorted: `sorted` rows of it are
+// adds places above the block that the mark has not seen
 static int rows_add(silt_front *f, int count, int begin, int mark, int above, const int *place, int n) {
     for (int k = 0; k < n; k++)
         if (place[k] >= above && f->local[place[k]] != mark) {
@@ -189,7 +191,7 @@ static void rows_find(silt_front *f, const silt_front_matrix *q) {
     }
     SILT_RESERVE(f->waiting, f->waiting_capacity, f->n_block + 1);
     int n_waiting = 0, filled = 0;
-    size_t value = 0, stacked = 0, peak = 0;
+    size_t value = 0, stacked[2] = {0, 0}, peak[2] = {0, 0};
     f->widest = 0;
     for (int e = 0; e < f->n_block; e++) {
         struct block *b = &f->block[e];
@@ -200,7 +202,7 @@ static void rows_find(silt_front *f, const silt_front_matrix *q) {
             const struct block *child = &f->block[f->waiting[c]];
             const int size = child->row_end - child->row_begin;
             count = rows_add(f, count, filled, e, b->end, f->row + child->row_begin, size);
-            stacked -= (size_t)size * (size_t)size;
+            stacked[!b->side] -= (size_t)size * (size_t)size;
         }
         for (int p = b->begin; p < b->end; p++) {
             const int u = f->order[p];
@@ -219,19 +221,14 @@ static void rows_find(silt_front *f, const silt_front_matrix *q) {
         const size_t own = (size_t)(b->end - b->begin);
         value += own * (own + (size_t)count);
         n_waiting -= b->n_child;
-        size_t below = stacked;
-        for (int c = 0; c < b->n_child; c++) { // the children are there while their parent is made
-            const struct block *child = &f->block[f->waiting[n_waiting + c]];
-            const int size = child->row_end - child->row_begin;
-            below += (size_t)size * (size_t)size;
-        }
         f->waiting[n_waiting++] = e;
-        stacked += (size_t)count * (size_t)count;
-        peak = below + (size_t)count * (size_t)count > peak ? below + (size_t)count * (size_t)count : peak;
+        stacked[b->side] += (size_t)count * (size_t)count;
+        peak[b->side] = stacked[b->side] > peak[b->side] ? stacked[b->side] : peak[b->side];
         f->widest = (int)own + count > f->widest ? (int)own + count : f->widest;
     }
     f->value = room(f->value, &f->value_capacity, value + DENSE_PAD);
-    f->stack = room(f->stack, &f->stack_capacity, peak);
+    for (int k = 0; k < 2; k++)
+        f->stack[k] = room(f->stack[k], &f->stack_capacity[k], peak[k] + 1);
     SILT_RESERVE(f->column, f->column_capacity, f->widest + 1);
     SILT_RESERVE(f->at, f->at_capacity, f->widest + 1);
     SILT_RESERVE(f->part_right, f->part_capacity, f->widest + DENSE_PAD);
@@ -260,7 +257,7 @@ void silt_front_order(silt_front **front, const silt_front_matrix *q, const doub
         f->local[i] = -2;
     }
     f->n_block = f->part = 0;
-    dissect(f, q, 0, n);
+    dissect(f, q, 0, n, 0);
     for (int k = 0; k < n; k++) {
         f->order[k] = f->item[k].node;
         f->place[f->order[k]] = k;
@@ -272,12 +269,11 @@ void silt_front_order(silt_front **front, const silt_front_matrix *q, const doub
 
 // the lower triangle only
 static inline void entry_add(double **column, int a, int b, double value) {
-    if (a >= b)
-        column[b][a] += value;
-    else
-        column[a][b] += value;
+    const int row = a > b ? a : b;
+    column[a + b - row][row] += value;
 }
 
+// stars whose first node the block eliminates
 static void assemble(const silt_front *f, const silt_front_matrix *q, const struct block *b) {
     double **column = f->column;
     int *at = f->at;
@@ -289,23 +285,18 @@ static void assemble(const silt_front *f, const silt_front_matrix *q, const stru
             if (f->first[i] != p)
                 continue;
             const int start = q->neighbour_start[i], size = q->neighbour_start[i + 1] - start;
-            const double *g = q->row + 2 * start;
+            const double *g = q->row + 3 * start;
             for (int m = 0; m < size; m++)
                 at[m] = f->local[f->place[q->neighbour[start + m]]];
-            for (int m = 0; m < size; m++)
-                for (int r = 0; r <= m; r++)
-                    entry_add(column, at[m], at[r], g[2 * m] * g[2 * r] + g[2 * m + 1] * g[2 * r + 1]);
-        }
-        for (int k = q->node_cell_start[u]; k < q->node_cell_start[u + 1]; k++) {
-            const int e = q->node_cell[k], *cell = q->cell[e];
-            const int p0 = f->place[cell[0]], p1 = f->place[cell[1]], p2 = f->place[cell[2]];
-            if (p0 < p || p1 < p || p2 < p)
-                continue;
-            const int into[3] = {f->local[p0], f->local[p1], f->local[p2]};
-            const double *g = q->flux + 6 * e;
-            for (int m = 0; m < 3; m++)
-                for (int r = 0; r <= m; r++)
-                    entry_add(column, into[m], into[r], q->weight[e] * (g[2 * m] * g[2 * r] + g[2 * m + 1] * g[2 * r + 1]));
+            const int own = f->local[f->place[i]];
+            for (int m = 0; m < size; m++, g += 3) {
+                const double *other = q->row + 3 * start;
+                for (int r = 0; r < m; r++, other += 3)
+                    entry_add(column, at[m], at[r], g[0] * other[0] + g[1] * other[1]);
+                column[at[m]][at[m]] += g[0] * g[0] + g[1] * g[1];
+                if (g[2] != 0)
+                    entry_add(column, at[m], own, g[2]);
+            }
         }
     }
 }
@@ -322,38 +313,41 @@ static void extend_add(const silt_front *f, const struct block *child, const dou
     }
 }
 
+// columns of the front: the block's own in the factor, the others in its update; 0 in the lower triangle
+static void columns_clear(const silt_front *f, const struct block *b, double *panel, double *update) {
+    const int own = b->end - b->begin, rest = b->row_end - b->row_begin, wide = own + rest;
+    for (int c = 0; c < own; c++) {
+        f->column[c] = panel + (size_t)c * (size_t)wide;
+        f->local[b->begin + c] = c;
+        memset(f->column[c] + c, 0, (size_t)(wide - c) * sizeof *panel);
+    }
+    for (int c = 0; c < rest; c++) {
+        f->column[own + c] = update + (size_t)c * (size_t)rest - own;
+        f->local[f->row[b->row_begin + c]] = own + c;
+        memset(f->column[own + c] + own + c, 0, (size_t)(rest - c) * sizeof *update);
+    }
+}
+
 int silt_front_factor(silt_front *f, const silt_front_matrix *q) {
     int n_waiting = 0;
-    double *top = f->stack;
+    double *top[2] = {f->stack[0], f->stack[1]};
     for (int e = 0; e < f->n_block; e++) {
         const struct block *b = &f->block[e];
-        const int own = b->end - b->begin, rest = b->row_end - b->row_begin, wide = own + rest;
-        double *panel = f->value + b->value, *update = top;
-        memset(panel, 0, (size_t)own * (size_t)wide * sizeof *panel);
-        memset(update, 0, (size_t)rest * (size_t)rest * sizeof *update);
-        for (int c = 0; c < own; c++) {
-            f->column[c] = panel + (size_t)c * (size_t)wide;
-            f->local[b->begin + c] = c;
-        }
-        for (int c = 0; c < rest; c++) {
-            f->column[own + c] = update + (size_t)c * (size_t)rest - own;
-            f->local[f->row[b->row_begin + c]] = own + c;
-        }
+        const int own = b->end - b->begin, wide = own + b->row_end - b->row_begin;
+        double *panel = f->value + b->value, *update = top[b->side];
+        columns_clear(f, b, panel, update);
         assemble(f, q, b);
-        double *base = top;
         for (int c = 0; c < b->n_child; c++) {
             const struct block *child = &f->block[f->waiting[--n_waiting]];
             const size_t size = (size_t)(child->row_end - child->row_begin);
-            base -= size * size;
-            extend_add(f, child, base);
+            top[!b->side] -= size * size;
+            extend_add(f, child, top[!b->side]);
         }
         const int bad = silt_dense_factor(own, wide, panel);
         if (bad >= 0)
             return f->order[b->begin + bad];
         silt_dense_update(own, wide, panel, update);
-        if (base != top)
-            memmove(base, update, (size_t)rest * (size_t)rest * sizeof *update);
-        top = base + (size_t)rest * (size_t)rest;
+        top[b->side] += (size_t)(wide - own) * (size_t)(wide - own);
         f->waiting[n_waiting++] = e;
     }
     return -1;
@@ -402,7 +396,8 @@ void silt_front_free(silt_front **front) {
     free(f->local);
     free(f->item);
     free(f->value);
-    free(f->stack);
+    free(f->stack[0]);
+    free(f->stack[1]);
     free(f->right);
     free(f->column);
     free(f->waiting);

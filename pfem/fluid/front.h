@@ -10,15 +10,12 @@
 
 typedef struct silt_front silt_front;
 
-/** What is summed, for nodes with neighbour lists as the mesh has them:
- * over nodes i, g g^T, twice (row: two numbers per entry of i's list); the diagonal; over cells, weight flux flux^T, twice */
+/** What is summed, over nodes i with neighbour lists as the mesh has them: g g^T twice, and what couples i with its neighbours
+ * of higher number (row: three numbers per entry of i's list, the two of g and the coupling); a diagonal */
 typedef struct silt_front_matrix {
-    int n, n_cell;
-    const int *neighbour_start, *neighbour, *node_cell_start, *node_cell;
-    const int (*cell)[4];
-    const double *row;      // 2 per neighbour
-    const double *flux;     // 2 per node of a cell
-    const double *weight;   // 1 per cell
+    int n;
+    const int *neighbour_start, *neighbour;
+    const double *row;      // 3 per neighbour
     const double *diagonal; // n
 } silt_front_matrix;
 

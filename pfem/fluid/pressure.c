@@ -16,15 +16,14 @@ struct silt_pressure {
     int64_t front_revision;    // of the mesh that its order belongs to
     bool compact;              // main is in use, not front
     int n;
-    double *gradient;       // owned, 2 per entry of the mesh's neighbour lists: rows of G, free part, over the root of the inertia
-    double *weight;         // owned, per cell, of the stabilisation
+    double *star;           // owned, 3 per entry of the mesh's neighbour lists: G, free part, over the root of the inertia; L
     uint8_t *pinned;        // owned, one per node: the pressure level of a closed piece of water
     double *row;            // owned
     double *extra;          // owned, per node: what pins closed water, added to the operator's diagonal
     double *cg[4], *work;   // owned, conjugate gradients: 1 per node; dim per node
     int cg_capacity[4], work_capacity, extra_capacity;
     int *group;             // owned, per node
-    int gradient_capacity, weight_capacity, pinned_capacity, row_capacity, group_capacity;
+    int star_capacity, pinned_capacity, row_capacity, group_capacity;
 };
 
 silt_pressure *silt_pressure_create(void) { return silt_alloc(1, sizeof(silt_pressure)); }
@@ -43,8 +42,7 @@ void silt_pressure_free(silt_pressure **pressure) {
         return;
     silt_pressure *p = *pressure;
     silt_pressure_forget(p);
-    free(p->gradient);
-    free(p->weight);
+    free(p->star);
     free(p->pinned);
     free(p->row);
     free(p->extra);
@@ -94,37 +92,36 @@ static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh
     system->revision = mesh->revision;
 }
 
-// what silt_front needs: rows of G and weights of L; the diagonal of their sum in `extra`
-static void rows_assemble(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh) {
+// what silt_front needs: rows of G with the couplings of L; the diagonal of L goes to `own`, that of the whole sum to `extra`
+static void rows_assemble(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh, double *own) {
     enum { D = 2, M = 3 };
-    SILT_RESERVE(p->gradient, p->gradient_capacity, D * mesh->neighbour_start[p->n] + 1);
-    SILT_RESERVE(p->weight, p->weight_capacity, mesh->n_cell + 1);
+    SILT_RESERVE(p->star, p->star_capacity, 3 * mesh->neighbour_start[p->n] + 1);
     SILT_RESERVE(p->group, p->group_capacity, p->n + 1);
     int *place = p->group; // of a neighbour in the present node's list
-    for (int e = 0; e < mesh->n_cell; e++) {
-        const double *flux = f->flux + M * D * e;
-        p->weight[e] = f->tau[e] * f->inverse[e];
-        for (int a = 0; a < M; a++)
-            p->extra[mesh->cell[e][a]] += p->weight[e] * silt_dot(D, flux + D * a, flux + D * a);
-    }
     for (int i = 0; i < p->n; i++) {
         const int start = mesh->neighbour_start[i], size = mesh->neighbour_start[i + 1] - start;
-        double *row = p->gradient + D * start;
-        memset(row, 0, (size_t)(D * size) * sizeof *row);
-        if (!mesh->wet[i] || f->hold[i] == HOLD_ALL)
-            continue;
+        double *row = p->star + 3 * start;
+        memset(row, 0, (size_t)(3 * size) * sizeof *row);
         for (int k = 0; k < size; k++)
             place[mesh->neighbour[start + k]] = k;
         for (int k = mesh->node_cell_start[i]; k < mesh->node_cell_start[i + 1]; k++) {
             const int e = mesh->node_cell[k], *cell = mesh->cell[e], a = cell[0] == i ? 0 : cell[1] == i ? 1 : 2;
-            const double *flux = f->flux + M * D * e, share = f->share ? f->share[M * e + a] : 0;
-            for (int b = 0; b < M; b++)
-                for (int d = 0; d < D; d++)
-                    row[D * place[cell[b]] + d] += flux[D * a + d] / M + share * flux[D * b + d];
+            const double *flux = f->flux + M * D * e, *mine = flux + D * a;
+            const double share = f->share ? f->share[M * e + a] : 0, weight = f->tau[e] * f->inverse[e];
+            for (int b = 0; b < M; b++) {
+                double *entry = row + 3 * place[cell[b]];
+                entry[0] += mine[0] / M + share * flux[D * b];
+                entry[1] += mine[1] / M + share * flux[D * b + 1];
+                entry[2] += weight * (mine[0] * flux[D * b] + mine[1] * flux[D * b + 1]);
+            }
         }
-        const double scale = 1 / sqrt(f->inertia[i]);
+        own[i] = row[3 * place[i] + 2];
+        p->extra[i] += own[i];
+        for (int k = 0; k <= place[i]; k++) // the others are their neighbours'
+            row[3 * k + 2] = 0;
+        const double scale = !mesh->wet[i] || f->hold[i] == HOLD_ALL ? 0 : 1 / sqrt(f->inertia[i]);
         for (int k = 0; k < size; k++) {
-            double *g = row + D * k;
+            double *g = row + 3 * k;
             if (f->hold[i] != HOLD_FREE)
                 silt_hold_project(f, i, g);
             for (int d = 0; d < D; d++)
@@ -264,15 +261,15 @@ static silt_status factor_compact(silt_pressure *p, silt_fluid *f, const silt_st
 
 static silt_status factor_fronts(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
-    rows_assemble(p, f, mesh);
+    double *diagonal = f->scratch;
+    rows_assemble(p, f, mesh, diagonal);
     const bool fresh = !p->front || p->front_revision != mesh->revision;
     if (fresh)
         pin_closed(p, mesh);
     for (int j = 0; j < p->n; j++)
-        p->extra[j] = pin(p, mesh, j, p->extra[j]);
+        diagonal[j] += pin(p, mesh, j, p->extra[j]);
     const silt_front_matrix matrix = {.n = p->n, .neighbour_start = mesh->neighbour_start, .neighbour = mesh->neighbour,
-        .node_cell_start = mesh->node_cell_start, .node_cell = mesh->node_cell, .n_cell = mesh->n_cell,
-        .cell = (const int (*)[4])mesh->cell, .row = p->gradient, .flux = f->flux, .weight = p->weight, .diagonal = p->extra};
+                                      .row = p->star, .diagonal = diagonal};
     if (fresh)
         SILT_CLOCKED(analyse, silt_front_order(&p->front, &matrix, s->nodes->x));
     p->front_revision = mesh->revision;
