@@ -3,7 +3,7 @@
 #include "dense.h"
 
 // parts of so few nodes are eliminated at one go
-#define FRONT_LEAF 24
+#define FRONT_LEAF 32
 
 /** a node on its way through the dissection */
 struct item {
