@@ -12,7 +12,7 @@
 /** a graph of nodes with places and the numbers of a matrix */
 typedef struct graph {
     int n, *start, *list;
-    double *x, *row, *diagonal;
+    double *x, *row, *weight, *diagonal;
     silt_front_matrix matrix;
     uint64_t state;
 } graph;
@@ -23,6 +23,7 @@ static void graph_open(graph *g, int n) {
     g->list = silt_alloc((size_t)n * MOST_BESIDE, sizeof *g->list);
     g->x = silt_alloc(2 * (size_t)n, sizeof *g->x);
     g->row = silt_alloc(3 * (size_t)n * MOST_BESIDE, sizeof *g->row);
+    g->weight = silt_alloc((size_t)n, sizeof *g->weight);
     g->diagonal = silt_alloc((size_t)n, sizeof *g->diagonal);
 }
 
@@ -39,10 +40,11 @@ static void graph_join(graph *g, bool (*joined)(const graph *, int, int)) {
                 entry[2] = j > i ? 0.1 * silt_uniform(&g->state) : 0;
                 g->list[filled++] = j;
             }
+        g->weight[i] = i % 50 ? 0.5 + silt_uniform(&g->state) : -0.01; // a weight may be negative where the others make up for it
         g->diagonal[i] = 1 + 0.1 * (filled - g->start[i]);
     }
     g->start[g->n] = filled;
-    g->matrix = (silt_front_matrix){.n = g->n, .neighbour_start = g->start, .neighbour = g->list, .row = g->row, .diagonal = g->diagonal};
+    g->matrix = (silt_front_matrix){.n = g->n, .neighbour_start = g->start, .neighbour = g->list, .row = g->row, .weight = g->weight, .diagonal = g->diagonal};
 }
 
 static void graph_close(graph *g) {
@@ -50,6 +52,7 @@ static void graph_close(graph *g) {
     free(g->list);
     free(g->x);
     free(g->row);
+    free(g->weight);
     free(g->diagonal);
 }
 
@@ -66,7 +69,7 @@ static void apply(const graph *g, const double *x, double *out) {
             out[g->list[k]] += entry[2] * x[i];
         }
         for (int k = g->start[i]; k < g->start[i + 1]; k++)
-            out[g->list[k]] += g->row[3 * k] * sum[0] + g->row[3 * k + 1] * sum[1];
+            out[g->list[k]] += g->weight[i] * (g->row[3 * k] * sum[0] + g->row[3 * k + 1] * sum[1]);
     }
 }
 

@@ -289,11 +289,12 @@ static void assemble(const silt_front *f, const silt_front_matrix *q, const stru
             for (int m = 0; m < size; m++)
                 at[m] = f->local[f->place[q->neighbour[start + m]]];
             const int own = f->local[f->place[i]];
+            const double weight = q->weight[i];
             for (int m = 0; m < size; m++, g += 3) {
-                const double *other = q->row + 3 * start;
+                const double *other = q->row + 3 * start, g0 = weight * g[0], g1 = weight * g[1];
                 for (int r = 0; r < m; r++, other += 3)
-                    entry_add(column, at[m], at[r], g[0] * other[0] + g[1] * other[1]);
-                column[at[m]][at[m]] += g[0] * g[0] + g[1] * g[1];
+                    entry_add(column, at[m], at[r], g0 * other[0] + g1 * other[1]);
+                column[at[m]][at[m]] += g0 * g[0] + g1 * g[1];
                 if (g[2] != 0)
                     entry_add(column, at[m], own, g[2]);
             }

@@ -10,12 +10,13 @@
 
 typedef struct silt_front silt_front;
 
-/** What is summed, over nodes i with neighbour lists as the mesh has them: g g^T twice, and what couples i with its neighbours
+/** What is summed, over nodes i with neighbour lists as the mesh has them: weight g g^T twice, and what couples i with its neighbours
  * of higher number (row: three numbers per entry of i's list, the two of g and the coupling); a diagonal */
 typedef struct silt_front_matrix {
     int n;
     const int *neighbour_start, *neighbour;
     const double *row;      // 3 per neighbour
+    const double *weight;   // n
     const double *diagonal; // n
 } silt_front_matrix;
 

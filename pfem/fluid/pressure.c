@@ -1,8 +1,8 @@
-// the pressure system. 2-D: summed over the nodes' stars, front by front. 3-D: conjugate gradients on the same operator, applied
+// the pressure system. 2-D: plane.c. 3-D: conjugate gradients on the same operator, applied
 // cell by cell, preconditioned by the factor of a compact Laplacian that resembles it
 #include "factor.h"
 #include "fluid.h"
-#include "front.h"
+#include "plane.h"
 
 /** a symmetric matrix over nodes and their neighbours, and its factor */
 typedef struct silt_system {
@@ -12,18 +12,17 @@ typedef struct silt_system {
 
 struct silt_pressure {
     silt_system main, stiff;   // a compact stand-in for S + L; L and the mass matrix over the viscosity
-    silt_front *front;         // owned, S + L in 2-D
-    int64_t front_revision;    // of the mesh that its order belongs to
-    bool compact;              // main is in use, not front
+    silt_plane *plane;         // owned, S + L in 2-D
+    bool plain;                // it is that
+    int64_t pinned_revision;   // of the mesh that `pinned` belongs to
     int n;
-    double *star;           // owned, 3 per entry of the mesh's neighbour lists: G, free part, over the root of the inertia; L
     uint8_t *pinned;        // owned, one per node: the pressure level of a closed piece of water
     double *row;            // owned
     double *extra;          // owned, per node: what pins closed water, added to the operator's diagonal
     double *cg[4], *work;   // owned, conjugate gradients: 1 per node; dim per node
     int cg_capacity[4], work_capacity, extra_capacity;
     int *group;             // owned, per node
-    int star_capacity, pinned_capacity, row_capacity, group_capacity;
+    int pinned_capacity, row_capacity, group_capacity;
 };
 
 silt_pressure *silt_pressure_create(void) { return silt_alloc(1, sizeof(silt_pressure)); }
@@ -33,8 +32,8 @@ void silt_pressure_forget(silt_pressure *pressure) {
         return;
     silt_factor_clear(&pressure->main.factor);
     silt_factor_clear(&pressure->stiff.factor);
-    silt_front_free(&pressure->front);
-    pressure->main.revision = pressure->stiff.revision = -1;
+    silt_plane_forget(pressure->plane);
+    pressure->main.revision = pressure->stiff.revision = pressure->pinned_revision = -1;
 }
 
 void silt_pressure_free(silt_pressure **pressure) {
@@ -42,7 +41,7 @@ void silt_pressure_free(silt_pressure **pressure) {
         return;
     silt_pressure *p = *pressure;
     silt_pressure_forget(p);
-    free(p->star);
+    silt_plane_free(&p->plane);
     free(p->pinned);
     free(p->row);
     free(p->extra);
@@ -74,6 +73,7 @@ static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     for (int k = 0; k < mesh->n_facet; k++)
         if (mesh->facet_kind[k] == FACET_OPEN)
             p->pinned[silt_group_find(parent, mesh->facet[k][0])] = 0;
+    p->pinned_revision = mesh->revision;
 }
 
 // lower triangle of the compact matrix, by columns
@@ -90,45 +90,6 @@ static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh
     }
     start[n] = at;
     system->revision = mesh->revision;
-}
-
-// what silt_front needs: rows of G with the couplings of L; the diagonal of L goes to `own`, that of the whole sum to `extra`
-static void rows_assemble(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh, double *own) {
-    enum { D = 2, M = 3 };
-    SILT_RESERVE(p->star, p->star_capacity, 3 * mesh->neighbour_start[p->n] + 1);
-    SILT_RESERVE(p->group, p->group_capacity, p->n + 1);
-    int *place = p->group; // of a neighbour in the present node's list
-    for (int i = 0; i < p->n; i++) {
-        const int start = mesh->neighbour_start[i], size = mesh->neighbour_start[i + 1] - start;
-        double *row = p->star + 3 * start;
-        memset(row, 0, (size_t)(3 * size) * sizeof *row);
-        for (int k = 0; k < size; k++)
-            place[mesh->neighbour[start + k]] = k;
-        for (int k = mesh->node_cell_start[i]; k < mesh->node_cell_start[i + 1]; k++) {
-            const int e = mesh->node_cell[k], *cell = mesh->cell[e], a = cell[0] == i ? 0 : cell[1] == i ? 1 : 2;
-            const double *flux = f->flux + M * D * e, *mine = flux + D * a;
-            const double share = f->share ? f->share[M * e + a] : 0, weight = f->tau[e] * f->inverse[e];
-            for (int b = 0; b < M; b++) {
-                double *entry = row + 3 * place[cell[b]];
-                entry[0] += mine[0] / M + share * flux[D * b];
-                entry[1] += mine[1] / M + share * flux[D * b + 1];
-                entry[2] += weight * (mine[0] * flux[D * b] + mine[1] * flux[D * b + 1]);
-            }
-        }
-        own[i] = row[3 * place[i] + 2];
-        p->extra[i] += own[i];
-        for (int k = 0; k <= place[i]; k++) // the others are their neighbours'
-            row[3 * k + 2] = 0;
-        const double scale = !mesh->wet[i] || f->hold[i] == HOLD_ALL ? 0 : 1 / sqrt(f->inertia[i]);
-        for (int k = 0; k < size; k++) {
-            double *g = row + 3 * k;
-            if (f->hold[i] != HOLD_FREE)
-                silt_hold_project(f, i, g);
-            for (int d = 0; d < D; d++)
-                g[d] *= scale;
-            p->extra[mesh->neighbour[start + k]] += silt_dot(D, g, g);
-        }
-    }
 }
 
 // stabilisation, and with `inertial` the Laplacian in place of the consistent operator
@@ -177,11 +138,6 @@ static void boundary_diagonal(silt_pressure *p, silt_fluid *f, const silt_mesh *
     }
 }
 
-static silt_status not_definite(const silt_step *s, int node, silt_error *err) {
-    const double *x = s->nodes->x + silt_nodes_dim(s->nodes) * node;
-    return silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite near (%g, %g)", x[0], x[1]);
-}
-
 static silt_status system_factor(silt_system *system, const silt_step *s, bool fresh, silt_error *err) {
     bool done;
     if (fresh)
@@ -190,7 +146,7 @@ static silt_status system_factor(silt_system *system, const silt_step *s, bool f
     if (done)
         return SILT_OK;
     system->revision = -1;
-    return not_definite(s, system->factor.bad, err);
+    return silt_pressure_indefinite(s, system->factor.bad, err);
 }
 
 // 3/(4 mu) of the lumped mass and the stabilisation: what is left of the pressure's operator when viscosity outweighs inertia
@@ -221,20 +177,15 @@ static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step
     return system_factor(system, s, fresh, err);
 }
 
-// what is added to the diagonal at node j: a crumb between held nodes knows its pressure up to a constant too
-static double pin(const silt_pressure *p, const silt_mesh *mesh, int j, double diagonal) {
-    return !mesh->wet[j] ? 1 : p->pinned[j] ? diagonal : 1e-9 * diagonal;
-}
-
 static silt_status factor_compact(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
     const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
     silt_system *system = &p->main;
     const bool fresh = system->revision != mesh->revision || !system->factor.inside;
-    if (fresh) {
+    SILT_RESERVE(p->extra, p->extra_capacity, p->n + 1);
+    memset(p->extra, 0, (size_t)p->n * sizeof *p->extra);
+    if (fresh)
         pattern_build(p, system, mesh);
-        pin_closed(p, mesh);
-    }
     if (consistent)
         boundary_diagonal(p, f, mesh);
     const int *start = system->factor.start, *index = system->factor.index;
@@ -247,7 +198,7 @@ static silt_status factor_compact(silt_pressure *p, silt_fluid *f, const silt_st
         double *diagonal = &value[start[j]];
         for (int k = start[j]; k < start[j + 1]; k++)
             value[k] = p->row[index[k]];
-        p->extra[j] = pin(p, mesh, j, *diagonal);
+        p->extra[j] = silt_pressure_pin(mesh, p->pinned, j, *diagonal);
         *diagonal = mesh->wet[j] ? *diagonal + p->extra[j] : 1;
         if (!consistent && mesh->surface[j]) // pressure increment prescribed on the free surface
             *diagonal += 1e12 * fabs(*diagonal);
@@ -259,34 +210,12 @@ static silt_status factor_compact(silt_pressure *p, silt_fluid *f, const silt_st
     return system_factor(system, s, fresh, err);
 }
 
-static silt_status factor_fronts(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
-    const silt_mesh *mesh = s->mesh;
-    double *diagonal = f->scratch;
-    rows_assemble(p, f, mesh, diagonal);
-    const bool fresh = !p->front || p->front_revision != mesh->revision;
-    if (fresh)
-        pin_closed(p, mesh);
-    for (int j = 0; j < p->n; j++)
-        diagonal[j] += pin(p, mesh, j, p->extra[j]);
-    const silt_front_matrix matrix = {.n = p->n, .neighbour_start = mesh->neighbour_start, .neighbour = mesh->neighbour,
-                                      .row = p->star, .diagonal = diagonal};
-    if (fresh)
-        SILT_CLOCKED(analyse, silt_front_order(&p->front, &matrix, s->nodes->x));
-    p->front_revision = mesh->revision;
-    int bad;
-    SILT_CLOCKED(factor, bad = silt_front_factor(p->front, &matrix));
-    if (bad < 0)
-        return SILT_OK;
-    silt_front_free(&p->front);
-    return not_definite(s, bad, err);
-}
-
 silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
-    p->compact = f->dim == 3 || s->scene->fluid.pressure != PRESSURE_CONSISTENT;
+    p->plain = f->dim == 2 && s->scene->fluid.pressure == PRESSURE_CONSISTENT;
     p->n = s->mesh->n_node;
-    SILT_RESERVE(p->extra, p->extra_capacity, p->n + 1);
-    memset(p->extra, 0, (size_t)p->n * sizeof *p->extra);
-    SILT_TRY(p->compact ? factor_compact(p, f, s, err) : factor_fronts(p, f, s, err));
+    if (!p->pinned || p->pinned_revision != s->mesh->revision)
+        pin_closed(p, s->mesh);
+    SILT_TRY(p->plain ? silt_plane_factor(&p->plane, f, s, p->pinned, err) : factor_compact(p, f, s, err));
     return stiff ? factor_stiff(p, f, s, err) : SILT_OK;
 }
 
@@ -323,8 +252,8 @@ static double dot(int n, const double *a, const double *b) {
 silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step *s, const double *right, double tolerance,
                                 double *x, silt_error *err) {
     const int n = p->n;
-    if (!p->compact) {
-        silt_front_solve(p->front, right, x);
+    if (p->plain) {
+        silt_plane_solve(p->plane, right, x);
         return SILT_OK;
     }
     if (s->scene->fluid.pressure != PRESSURE_CONSISTENT)
