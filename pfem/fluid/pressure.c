@@ -1,27 +1,25 @@
-// the pressure system. 2-D: assembled row by row from the node's gradients, factored by CHOLMOD. 3-D: space.c
+// the pressure system: S + L in the plane (plane.c) and in space (space.c), here its Laplacian counterpart
 #include "factor.h"
+#include "plane.h"
 #include "space.h"
 
-/** a symmetric matrix and its factor */
+/** a symmetric matrix over nodes and their neighbours, and its factor */
 typedef struct silt_system {
     silt_factor factor;     // owned
     int64_t revision;       // of the mesh that the pattern belongs to
-    bool compact;           // neighbours only, not nodes at distance two
 } silt_system;
 
 struct silt_pressure {
-    silt_system main, stiff;   // S + L or its Laplacian counterpart; L and the mass matrix over the viscosity
+    silt_system main, stiff;   // the Laplacian; L and the mass matrix over the viscosity
+    silt_plane *plane;         // owned, S + L in 2-D
     silt_space *space;         // owned, S + L in 3-D
-    bool rows;                 // it is that
+    bool in_plane, in_space;   // it is that
     int64_t pinned_revision;   // of the mesh that `pinned` belongs to
     int n;
-    double *gradient;       // owned, dim per entry, G_ij along the mesh's neighbour lists
-    int *mirror;            // owned, index of (j, i) for the entry (i, j)
-    int *place;             // owned, (dim + 1)^2 per cell: where (i, j) stands in the neighbour lists
     uint8_t *pinned;        // owned, one per node: the pressure level of a closed piece of water
     double *row;            // owned
-    int *mark, *list;       // owned
-    int gradient_capacity, mirror_capacity, place_capacity, pinned_capacity, row_capacity, mark_capacity, list_capacity;
+    int *group;             // owned, per node
+    int pinned_capacity, row_capacity, group_capacity;
 };
 
 silt_pressure *silt_pressure_create(void) { return silt_alloc(1, sizeof(silt_pressure)); }
@@ -31,6 +29,7 @@ void silt_pressure_forget(silt_pressure *pressure) {
         return;
     silt_factor_clear(&pressure->main.factor);
     silt_factor_clear(&pressure->stiff.factor);
+    silt_plane_forget(pressure->plane);
     pressure->main.revision = pressure->stiff.revision = pressure->pinned_revision = -1;
 }
 
@@ -39,14 +38,11 @@ void silt_pressure_free(silt_pressure **pressure) {
         return;
     silt_pressure *p = *pressure;
     silt_pressure_forget(p);
-    free(p->gradient);
-    free(p->mirror);
-    free(p->place);
+    silt_plane_free(&p->plane);
+    silt_space_free(&p->space);
     free(p->pinned);
     free(p->row);
-    silt_space_free(&p->space);
-    free(p->mark);
-    free(p->list);
+    free(p->group);
     free(p);
     *pressure = NULL;
 }
@@ -54,7 +50,8 @@ void silt_pressure_free(silt_pressure **pressure) {
 // pieces of water without a free surface, or an opening with a level, know their pressure up to a constant: one node each is pinned
 static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     SILT_RESERVE(p->pinned, p->pinned_capacity, mesh->n_node + 1);
-    int *parent = silt_alloc((size_t)mesh->n_node + 1, sizeof *parent);
+    SILT_RESERVE(p->group, p->group_capacity, mesh->n_node + 1);
+    int *parent = p->group;
     for (int i = 0; i < mesh->n_node; i++) {
         parent[i] = i;
         p->pinned[i] = 0;
@@ -70,104 +67,23 @@ static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
     for (int k = 0; k < mesh->n_facet; k++)
         if (mesh->facet_kind[k] == FACET_OPEN)
             p->pinned[silt_group_find(parent, mesh->facet[k][0])] = 0;
-    free(parent);
     p->pinned_revision = mesh->revision;
 }
 
-// lower triangle of the matrix, by columns: nodes at distance two, or neighbours only
-static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh *mesh, int D, bool compact) {
-    const int n = mesh->n_node, n_entry = mesh->neighbour_start[n], m = D + 1;
+// lower triangle of the compact matrix, by columns
+static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh *mesh) {
+    const int n = mesh->n_node;
     SILT_RESERVE(p->row, p->row_capacity, n + 1);
-    SILT_RESERVE(p->mark, p->mark_capacity, n + 1);
-    SILT_RESERVE(p->list, p->list_capacity, n + 1);
-    if (!compact) {
-        SILT_RESERVE(p->gradient, p->gradient_capacity, D * n_entry + 1);
-        SILT_RESERVE(p->mirror, p->mirror_capacity, n_entry + 1);
-        SILT_RESERVE(p->place, p->place_capacity, m * m * mesh->n_cell + 1);
-        for (int i = 0; i < n; i++)
-            for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++)
-                p->mirror[k] = silt_neighbour_index(mesh, mesh->neighbour[k], i);
-        for (int e = 0; e < mesh->n_cell; e++)
-            for (int a = 0; a < m; a++)
-                for (int b = 0; b < m; b++)
-                    p->place[m * m * e + m * a + b] = silt_neighbour_index(mesh, mesh->cell[e][a], mesh->cell[e][b]);
+    const int filled = (mesh->neighbour_start[n] + n) / 2; // lists hold the node itself
+    int *start = silt_factor_pattern(&system->factor, n, filled), *index = system->factor.index, at = 0;
+    for (int j = 0; j < n; j++) {
+        start[j] = at;
+        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
+            if (mesh->neighbour[k] >= j)
+                index[at++] = mesh->neighbour[k];
     }
-
-    // count, then fill
-    int *start = silt_alloc((size_t)n + 1, sizeof *start);
-    for (int pass = 0; pass < 2; pass++) {
-        for (int j = 0; j < n; j++)
-            p->mark[j] = -1;
-        int filled = 0;
-        for (int j = 0; j < n; j++) {
-            int count = 0;
-            for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
-                const int i = mesh->neighbour[k];
-                if (compact) {
-                    if (i >= j)
-                        p->list[count++] = i;
-                    continue;
-                }
-                for (int q = mesh->neighbour_start[i]; q < mesh->neighbour_start[i + 1]; q++) {
-                    const int c = mesh->neighbour[q];
-                    if (c >= j && p->mark[c] != j) {
-                        p->mark[c] = j;
-                        p->list[count++] = c;
-                    }
-                }
-            }
-            if (pass) {
-                // insertion sort: rows of a column rise, lists are short
-                for (int a = 1; a < count; a++) {
-                    const int key = p->list[a];
-                    int b = a - 1;
-                    for (; b >= 0 && p->list[b] > key; b--)
-                        p->list[b + 1] = p->list[b];
-                    p->list[b + 1] = key;
-                }
-                memcpy(system->factor.index + filled, p->list, (size_t)count * sizeof(int));
-            }
-            start[j] = filled;
-            filled += count;
-        }
-        start[n] = filled;
-        if (pass == 0)
-            memcpy(silt_factor_pattern(&system->factor, n, filled), start, ((size_t)n + 1) * sizeof *start);
-    }
-    free(start);
-    system->compact = compact;
+    start[n] = at;
     system->revision = mesh->revision;
-}
-
-static void gradient_assemble(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh) {
-    const int D = f->dim, m = D + 1;
-    memset(p->gradient, 0, (size_t)(D * mesh->neighbour_start[mesh->n_node]) * sizeof *p->gradient);
-    for (int e = 0; e < mesh->n_cell; e++) {
-        const double *flux = f->flux + m * D * e;
-        for (int a = 0; a < m; a++)
-            for (int b = 0; b < m; b++)
-                for (int d = 0; d < D; d++)
-                    p->gradient[D * p->place[m * m * e + m * a + b] + d] +=
-                        flux[D * a + d] / m + (f->share ? f->share[m * e + a] * flux[D * b + d] : 0);
-    }
-}
-
-// one column of sum_i G_i^T P_i G_i / inertia_i
-static void column_consistent(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh, int j) {
-    const int D = f->dim;
-    for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
-        const int i = mesh->neighbour[k];
-        if (f->hold[i] == HOLD_ALL)
-            continue;
-        double g[3];
-        memcpy(g, p->gradient + D * p->mirror[k], (size_t)D * sizeof(double));
-        silt_hold_project(f, i, g);
-        for (int d = 0; d < D; d++)
-            g[d] /= f->inertia[i];
-        for (int m = mesh->neighbour_start[i]; m < mesh->neighbour_start[i + 1]; m++)
-            for (int d = 0; d < D; d++)
-                p->row[mesh->neighbour[m]] += g[d] * p->gradient[D * m + d];
-    }
 }
 
 // stabilisation, and with `inertial` the Laplacian in place of the consistent operator
@@ -194,16 +110,15 @@ static void column_laplacian(silt_pressure *p, const silt_fluid *f, const silt_m
     }
 }
 
-static silt_status system_factor(silt_system *system, const silt_fluid *f, const silt_step *s, bool fresh, silt_error *err) {
+static silt_status system_factor(silt_system *system, const silt_step *s, bool fresh, silt_error *err) {
     bool done;
     if (fresh)
         SILT_CLOCKED(analyse, silt_factor_analyse(&system->factor, FACTOR_DEFINITE, NULL));
     SILT_CLOCKED(factor, done = silt_factor_compute(&system->factor));
     if (done)
         return SILT_OK;
-    const double *x = s->nodes->x + f->dim * system->factor.bad;
     system->revision = -1;
-    return silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite near (%g, %g)", x[0], x[1]);
+    return silt_pressure_indefinite(s, system->factor.bad, err);
 }
 
 // 3/(4 mu) of the lumped mass and the stabilisation: what is left of the pressure's operator when viscosity outweighs inertia
@@ -213,7 +128,7 @@ static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step
     silt_system *system = &p->stiff;
     const bool fresh = system->revision != mesh->revision || !system->factor.inside;
     if (fresh)
-        pattern_build(p, system, mesh, f->dim, true);
+        pattern_build(p, system, mesh);
     double *fluidity = f->scratch;
     memset(fluidity, 0, (size_t)p->n * sizeof(double));
     for (int e = 0; e < mesh->n_cell; e++)
@@ -231,58 +146,45 @@ static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step
             p->row[mesh->neighbour[k]] = 0;
         p->row[j] = 0;
     }
-    return system_factor(system, f, s, fresh, err);
+    return system_factor(system, s, fresh, err);
 }
 
-// 2-D, and the Laplacian in 3-D
-static silt_status factor_main(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
+static silt_status factor_laplacian(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
-    const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT, compact = !consistent;
     silt_system *system = &p->main;
-    const bool fresh = system->revision != mesh->revision || !system->factor.inside || system->compact != compact;
+    const bool fresh = system->revision != mesh->revision || !system->factor.inside;
     if (fresh)
-        pattern_build(p, system, mesh, f->dim, compact);
-    if (!compact)
-        gradient_assemble(p, f, mesh);
-
+        pattern_build(p, system, mesh);
     const int *start = system->factor.start, *index = system->factor.index;
     double *value = system->factor.value;
     memset(p->row, 0, (size_t)p->n * sizeof *p->row);
     for (int j = 0; j < p->n; j++) {
-        if (mesh->wet[j]) {
-            if (!compact)
-                column_consistent(p, f, mesh, j);
-            column_laplacian(p, f, mesh, j, compact);
-        }
+        if (mesh->wet[j])
+            column_laplacian(p, f, mesh, j, true);
         double *diagonal = &value[start[j]];
         for (int k = start[j]; k < start[j + 1]; k++)
             value[k] = p->row[index[k]];
-        if (!mesh->wet[j])
-            *diagonal = 1;
-        else
-            *diagonal += (p->pinned[j] ? 1 : 1e-9) * *diagonal; // a crumb between held nodes knows its pressure up to a constant too
-        if (!consistent && mesh->surface[j]) // pressure increment prescribed on the free surface
+        *diagonal = mesh->wet[j] ? *diagonal + silt_pressure_pin(mesh, p->pinned, j, *diagonal) : 1;
+        if (mesh->surface[j]) // pressure increment prescribed on the free surface
             *diagonal += 1e12 * fabs(*diagonal);
         // clear what this column touched
-        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
-            const int i = mesh->neighbour[k];
-            p->row[i] = 0;
-            for (int m = mesh->neighbour_start[i]; !compact && m < mesh->neighbour_start[i + 1]; m++)
-                p->row[mesh->neighbour[m]] = 0;
-        }
+        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
+            p->row[mesh->neighbour[k]] = 0;
         p->row[j] = 0;
     }
-    return system_factor(system, f, s, fresh, err);
+    return system_factor(system, s, fresh, err);
 }
 
 silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
+    const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
+    p->in_plane = f->dim == 2 && consistent;
+    p->in_space = f->dim == 3 && consistent;
     p->n = s->mesh->n_node;
-    if (p->pinned_revision != s->mesh->revision || !p->pinned)
+    if (!p->pinned || p->pinned_revision != s->mesh->revision)
         pin_closed(p, s->mesh);
-    p->rows = f->dim == 3 && s->scene->fluid.pressure == PRESSURE_CONSISTENT;
-    if (p->rows)
+    if (p->in_space)
         return silt_space_build(&p->space, f, s, p->pinned, stiff, err);
-    SILT_TRY(factor_main(p, f, s, err));
+    SILT_TRY(p->in_plane ? silt_plane_factor(&p->plane, f, s, p->pinned, err) : factor_laplacian(p, f, s, err));
     return stiff ? factor_stiff(p, f, s, err) : SILT_OK;
 }
 
@@ -293,11 +195,14 @@ static silt_status factor_solve(silt_system *system, const double *right, double
 }
 
 silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const double *right, double tolerance, double *x, silt_error *err) {
-    if (p->rows)
+    if (p->in_space)
         return silt_space_solve(p->space, right, tolerance, x, &f->pressure_iterations, err);
-    return factor_solve(&p->main, right, x, err);
+    if (!p->in_plane)
+        return factor_solve(&p->main, right, x, err);
+    silt_plane_solve(p->plane, right, x);
+    return SILT_OK;
 }
 
 silt_status silt_pressure_solve_stiff(silt_pressure *p, const double *right, double *increment, silt_error *err) {
-    return p->rows ? silt_space_solve_stiff(p->space, right, increment, err) : factor_solve(&p->stiff, right, increment, err);
+    return p->in_space ? silt_space_solve_stiff(p->space, right, increment, err) : factor_solve(&p->stiff, right, increment, err);
 }

@@ -1,0 +1,31 @@
+/** @file front.h
+ * Direct solution of a symmetric positive definite system whose matrix is a sum over the nodes' stars (a node and its neighbours),
+ * 2-D: nested dissection by place, then fronts (Duff and Reid, ACM Trans. Math. Softw. 9, 1983). The matrix is never put
+ * together: a star goes straight into the front that eliminates the first of its nodes.
+ */
+#ifndef SILT_FRONT_H
+#define SILT_FRONT_H
+
+#include "base.h"
+
+typedef struct silt_front silt_front;
+
+/** What is summed, over nodes i with neighbour lists as the mesh has them: weight g g^T twice, and what couples i with its neighbours
+ * of higher number (row: three numbers per entry of i's list, the two of g and the coupling); a diagonal */
+typedef struct silt_front_matrix {
+    int n;
+    const int *neighbour_start, *neighbour;
+    const double *row;      // 3 per neighbour
+    const double *weight;   // n
+    const double *diagonal; // n
+} silt_front_matrix;
+
+/** The order of elimination and room for the factor. x: places, 2 per node; only the order hangs on them. Makes *front at first. */
+void silt_front_order(silt_front **front, const silt_front_matrix *matrix, const double *x);
+/** @return -1, or a node where the matrix is not positive definite */
+int silt_front_factor(silt_front *front, const silt_front_matrix *matrix);
+/** out = matrix^-1 right, which may be the same array */
+void silt_front_solve(silt_front *front, const double *right, double *out);
+void silt_front_free(silt_front **front);
+
+#endif
