@@ -14,7 +14,6 @@ typedef struct silt_pressure silt_pressure; // the pressure matrix and its facto
 typedef struct silt_stiff silt_stiff;       // factors of momentum and continuity where viscosity is stiff, stiff.c
 typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
 
-
 /** what a step sees */
 typedef struct silt_step {
     const silt_scene *scene;
@@ -169,8 +168,10 @@ silt_pressure *silt_pressure_create(void);
 void silt_pressure_free(silt_pressure **pressure);
 /** Assembles and factors  sum_i G_i^T P_i G_i / inertia_i + L  (consistent) or its Laplacian counterpart; where that is too
  * dear (3-D) a compact matrix like it, which then preconditions conjugate gradients.
- * stiff: the viscous counterpart is wanted too. Errors: SILT_FAILED when the matrix is not positive definite. */
-silt_status silt_pressure_factor(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, bool stiff, silt_error *err);
+ * Errors: SILT_FAILED when the matrix is not positive definite. */
+silt_status silt_pressure_factor(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, silt_error *err);
+/** the viscous counterpart, for silt_pressure_solve_stiff; the same errors */
+silt_status silt_pressure_factor_stiff(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, silt_error *err);
 /** increment = matrix^-1 right; iterations stop at `tolerance` relative to the right side */
 silt_status silt_pressure_solve(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, const double *right,
                                 double tolerance, double *increment, silt_error *err);

@@ -233,7 +233,7 @@ static silt_status system_factor(silt_system *system, const silt_fluid *f, const
 
 // 3/(4 mu) of the lumped mass and the stabilisation: what is left of the pressure's operator when viscosity outweighs inertia
 // (3/4: a gradient field meets 4/3 mu of the deviatoric stress)
-static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
+silt_status silt_pressure_factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
     silt_system *system = &p->stiff;
     const bool fresh = system->revision != mesh->revision || !system->factor.inside;
@@ -259,7 +259,7 @@ static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step
     return system_factor(system, f, s, fresh, err);
 }
 
-silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
+silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
     const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
     const bool compact = f->dim == 3 || !consistent;
@@ -306,8 +306,7 @@ silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_ste
         }
         p->row[j] = 0;
     }
-    SILT_TRY(system_factor(system, f, s, fresh, err));
-    return stiff ? factor_stiff(p, f, s, err) : SILT_OK;
+    return system_factor(system, f, s, fresh, err);
 }
 
 static silt_status factor_solve(silt_system *system, const double *right, double *out, silt_error *err) {
