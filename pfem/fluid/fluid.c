@@ -430,6 +430,15 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
     }
 }
 
+// the factor that correct_stiff solves with, once a step
+static silt_status prepare_stiff(silt_fluid *f, const silt_step *s, bool *ready, silt_error *err) {
+    silt_status status = SILT_OK;
+    if (!*ready)
+        SILT_CLOCKED(matrix, status = silt_pressure_factor_stiff(f->pressure, f, s, err));
+    *ready = status == SILT_OK;
+    return status;
+}
+
 // stiff viscosity: the pressure's operator is nearly the mass matrix over the viscosity, its inverse adds to that of S + L
 // (Cahouet and Chabard, Int. J. Numer. Meth. Fluids 8, 1988)
 static silt_status correct_stiff(silt_fluid *f, silt_error *err) {
@@ -532,7 +541,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
     const size_t bytes = (size_t)D * (size_t)f->n_node * sizeof(double);
     double before = HUGE_VAL;
     // a first pressure has nothing to start from
-    bool first = true, whole = false;
+    bool first = true, whole = false, twofold = false;
     silt_mix_restart(&f->mix);
     for (int i = 0; i < f->n_node && first; i++)
         first = p[i] == 0;
@@ -549,9 +558,10 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
                 SILT_TRY(explicit_limit(f, s, err));
             silt_mobile_find(f, s->mesh, p);
             whole = direct && mean_stiffness(f, s) > FLUID_STIFF; // a stiff cell here and there is no reason
-            SILT_CLOCKED(matrix,
-                         status = silt_pressure_factor(f->pressure, f, s, !direct && stiffness(f, s) > FLUID_STIFF, err));
+            SILT_CLOCKED(matrix, status = silt_pressure_factor(f->pressure, f, s, err));
             SILT_TRY(status);
+            if (!direct && stiffness(f, s) > FLUID_STIFF)
+                SILT_TRY(prepare_stiff(f, s, &twofold, err));
             if (f->theta < 0.75 && !s->drag) {
                 // a first pressure, nought, does not balance the smoothing of the potential
                 double *potential = f->potential;
@@ -628,8 +638,10 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             SILT_TRY(pressure_increment(f, s, 0.01, err));
         if (!whole)
             correct(f, s, f->increment, f->w);
-        if (stiff > FLUID_STIFF && !direct)
+        if (stiff > FLUID_STIFF && !direct) {
+            SILT_TRY(prepare_stiff(f, s, &twofold, err)); // viscosity may have grown since the first iteration
             SILT_TRY(correct_stiff(f, err));
+        }
         for (int i = 0; i < f->n_node; i++)
             p[i] += f->increment[i];
         if (stiff > FLUID_STIFF || squeezed)

@@ -14,7 +14,6 @@ typedef struct silt_pressure silt_pressure; // the pressure matrix and its facto
 typedef struct silt_stiff silt_stiff;       // factors of momentum and continuity where viscosity is stiff, stiff.c
 typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
 
-
 /** what a step sees */
 typedef struct silt_step {
     const silt_scene *scene;
@@ -188,9 +187,10 @@ void silt_mix_next(silt_mix *mix, int dim, int n, const double *change, const do
 silt_pressure *silt_pressure_create(void);
 void silt_pressure_free(silt_pressure **pressure);
 /** Assembles  sum_i G_i^T P_i G_i / inertia_i + L  (consistent) or its Laplacian counterpart, and factors it; in 3-D the first is
- * left to conjugate gradients (space.c).
- * stiff: the viscous counterpart is wanted too. Errors: SILT_FAILED when the matrix is not positive definite. */
-silt_status silt_pressure_factor(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, bool stiff, silt_error *err);
+ * left to conjugate gradients (space.c). Errors: SILT_FAILED when the matrix is not positive definite. */
+silt_status silt_pressure_factor(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, silt_error *err);
+/** the viscous counterpart, for silt_pressure_solve_stiff; the same errors */
+silt_status silt_pressure_factor_stiff(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, silt_error *err);
 /** increment = matrix^-1 right; conjugate gradients stop at `tolerance` relative to the right side. The mesh is that of the factor. */
 silt_status silt_pressure_solve(silt_pressure *pressure, silt_fluid *fluid, const double *right, double tolerance,
                                 double *increment, silt_error *err);

@@ -42,7 +42,7 @@ silt_hold silt_level_hold(const silt_step *s, int i, double vector[3]) {
             return HOLD_ALL;
     const int n = silt_level_sides(s->walls, &o, nodes->wall[i], side);
     // on the rim a wall in the opening's own plane holds the water back
-    if (nodes->wall[i][n] >= 0 && n < 3) {
+    if (n < 3 && nodes->wall[i][n] >= 0) {
         memcpy(vector, o.normal, 3 * sizeof *vector);
         return s->mesh->surface[i] && n == 0 ? HOLD_NORMAL : HOLD_ALL;
     }
@@ -58,14 +58,18 @@ silt_hold silt_level_hold(const silt_step *s, int i, double vector[3]) {
 }
 
 // area vector of a facet on the midpoint mesh, out of the water
-static void facet_vector(int dim, const double *x, const int *facet, double vector[3]) {
-    const double *p = x + dim * facet[0], *q = x + dim * facet[1], *r = x + dim * facet[dim - 1];
-    vector[0] = q[1] - p[1];
-    vector[1] = p[0] - q[0];
+static void facet_vector(const silt_mesh *mesh, int dim, const double *x, const int *facet, double vector[3]) {
+    double u[3] = {0}, w[3] = {0};
+    for (int d = 0; d < dim; d++) {
+        u[d] = silt_shortest(mesh, d, x[dim * facet[1] + d] - x[dim * facet[0] + d]);
+        w[d] = silt_shortest(mesh, d, x[dim * facet[dim - 1] + d] - x[dim * facet[0] + d]);
+    }
+    vector[0] = u[1];
+    vector[1] = -u[0];
     vector[2] = 0;
     for (int d = 0; d < 3 && dim == 3; d++) {
         const int e = (d + 1) % 3, f = (d + 2) % 3;
-        vector[d] = 0.5 * ((q[e] - p[e]) * (r[f] - p[f]) - (q[f] - p[f]) * (r[e] - p[e]));
+        vector[d] = 0.5 * (u[e] * w[f] - u[f] * w[e]);
     }
 }
 
@@ -82,7 +86,7 @@ void silt_levels_load(silt_fluid *f, const silt_step *s) {
         const silt_opening o = silt_opening_of(s->scene, s->nodes->owner[facet[0]]);
         const double level = silt_series_at(o.level, 1, s->time + 0.5 * s->dt);
         double vector[3], p[3], sum = 0;
-        facet_vector(D, f->x_mid, facet, vector);
+        facet_vector(mesh, D, f->x_mid, facet, vector);
         for (int a = 0; a < D; a++)
             sum += p[a] = weight * silt_max(0, level - f->x_mid[D * facet[a] + up]);
         for (int a = 0; a < D; a++) {

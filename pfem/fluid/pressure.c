@@ -123,7 +123,9 @@ static silt_status system_factor(silt_system *system, const silt_step *s, bool f
 
 // 3/(4 mu) of the lumped mass and the stabilisation: what is left of the pressure's operator when viscosity outweighs inertia
 // (3/4: a gradient field meets 4/3 mu of the deviatoric stress)
-static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
+silt_status silt_pressure_factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
+    if (p->in_space)
+        return silt_space_build(&p->space, f, s, p->pinned, true, err);
     const silt_mesh *mesh = s->mesh;
     silt_system *system = &p->stiff;
     const bool fresh = system->revision != mesh->revision || !system->factor.inside;
@@ -175,7 +177,7 @@ static silt_status factor_laplacian(silt_pressure *p, silt_fluid *f, const silt_
     return system_factor(system, s, fresh, err);
 }
 
-silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
+silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
     p->in_plane = f->dim == 2 && consistent;
     p->in_space = f->dim == 3 && consistent;
@@ -183,9 +185,8 @@ silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_ste
     if (!p->pinned || p->pinned_revision != s->mesh->revision)
         pin_closed(p, s->mesh);
     if (p->in_space)
-        return silt_space_build(&p->space, f, s, p->pinned, stiff, err);
-    SILT_TRY(p->in_plane ? silt_plane_factor(&p->plane, f, s, p->pinned, err) : factor_laplacian(p, f, s, err));
-    return stiff ? factor_stiff(p, f, s, err) : SILT_OK;
+        return silt_space_build(&p->space, f, s, p->pinned, false, err);
+    return p->in_plane ? silt_plane_factor(&p->plane, f, s, p->pinned, err) : factor_laplacian(p, f, s, err);
 }
 
 static silt_status factor_solve(silt_system *system, const double *right, double *out, silt_error *err) {

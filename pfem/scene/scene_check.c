@@ -44,8 +44,8 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
                           first->key);
     if (scene->fluid.on && !silt_tree_item(fluid, "regions") && !silt_tree_item(fluid, "inlets") &&
         !silt_tree_item(fluid, "cloud"))
-        silt_complain_key(reader, fluid, "key 'fluid.regions': found %s, allowed at least one: there is no water",
-                          "neither regions nor inlets");
+        silt_complain_key(reader, fluid,
+                          "key 'fluid.regions': found neither regions nor inlets, allowed at least one: there is no water");
     const silt_tree *regions = silt_tree_item(bed, "regions");
     if (regions && regions->kind == TREE_LIST && regions->n_item == 0)
         silt_complain(reader, regions, "key 'bed.regions': found an empty list, allowed at least one region");
@@ -111,10 +111,21 @@ static void check_corners(silt_reader *reader, const silt_scene *scene, int k) {
                       flat ? "a polygon that is not convex or has no area" : "corners that do not lie in one plane");
 }
 
+// the Laplacian's increments are free on an opening: nothing there holds the pressure that the level gives
+static void check_level_pressure(silt_reader *reader, const silt_scene *scene) {
+    bool level = false;
+    for (int k = 0; k < silt_opening_count(scene); k++)
+        level |= silt_opening_of(scene, k).level != NULL;
+    if (level && scene->fluid.pressure == PRESSURE_LAPLACIAN)
+        silt_complain(reader, silt_tree_find(reader->root, "fluid.pressure"),
+                      "key 'fluid.pressure': found laplacian beside an opening with a head or level, allowed consistent there");
+}
+
 // openings have two ends, or corners, and a name of their own
 static void check_openings(silt_reader *reader, const silt_scene *scene) {
     const silt_fluid_def *fluid = &scene->fluid;
     int n_in = fluid->n_inlet, n = n_in + fluid->n_outlet;
+    check_level_pressure(reader, scene);
     for (int i = 0; i < n && scene->dimension == 3; i++)
         check_corners(reader, scene, i);
     for (int i = 0; i < n_in; i++)

@@ -319,6 +319,10 @@ static void read_series(read_state *state, const silt_key *key, const silt_tree 
         silt_series_constant(value, read_number(state, key, node, path, &x) ? x : 0);
         return;
     }
+    if (key->kind == KEY_CURVE && (node->kind != TREE_SCALAR || read_empty(node))) {
+        read_refuse(state, node, key, path, "");
+        return;
+    }
     read_text(state, &(silt_key){.kind = KEY_FILE, .name = key->name}, node, path, &file);
     if (!file)
         return;
