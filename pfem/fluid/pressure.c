@@ -1,7 +1,6 @@
-// the pressure system. 2-D: assembled row by row from the node's gradients, factored by CHOLMOD. 3-D: conjugate gradients on
-// the same operator, applied cell by cell, preconditioned by the factor of a compact Laplacian that resembles it
+// the pressure system. 2-D: assembled row by row from the node's gradients, factored by CHOLMOD. 3-D: space.c
 #include "factor.h"
-#include "fluid.h"
+#include "space.h"
 
 /** a symmetric matrix and its factor */
 typedef struct silt_system {
@@ -11,16 +10,16 @@ typedef struct silt_system {
 } silt_system;
 
 struct silt_pressure {
-    silt_system main, stiff;   // S + L or a compact stand-in; L and the mass matrix over the viscosity
+    silt_system main, stiff;   // S + L or its Laplacian counterpart; L and the mass matrix over the viscosity
+    silt_space *space;         // owned, S + L in 3-D
+    bool rows;                 // it is that
+    int64_t pinned_revision;   // of the mesh that `pinned` belongs to
     int n;
     double *gradient;       // owned, dim per entry, G_ij along the mesh's neighbour lists
     int *mirror;            // owned, index of (j, i) for the entry (i, j)
     int *place;             // owned, (dim + 1)^2 per cell: where (i, j) stands in the neighbour lists
     uint8_t *pinned;        // owned, one per node: the pressure level of a closed piece of water
     double *row;            // owned
-    double *extra;          // owned, per node: what pins closed water, added to the operator's diagonal
-    double *cg[4], *work;   // owned, conjugate gradients: 1 per node; dim per node
-    int cg_capacity[4], work_capacity, extra_capacity;
     int *mark, *list;       // owned
     int gradient_capacity, mirror_capacity, place_capacity, pinned_capacity, row_capacity, mark_capacity, list_capacity;
 };
@@ -32,7 +31,7 @@ void silt_pressure_forget(silt_pressure *pressure) {
         return;
     silt_factor_clear(&pressure->main.factor);
     silt_factor_clear(&pressure->stiff.factor);
-    pressure->main.revision = pressure->stiff.revision = -1;
+    pressure->main.revision = pressure->stiff.revision = pressure->pinned_revision = -1;
 }
 
 void silt_pressure_free(silt_pressure **pressure) {
@@ -45,10 +44,7 @@ void silt_pressure_free(silt_pressure **pressure) {
     free(p->place);
     free(p->pinned);
     free(p->row);
-    free(p->extra);
-    for (int k = 0; k < 4; k++)
-        free(p->cg[k]);
-    free(p->work);
+    silt_space_free(&p->space);
     free(p->mark);
     free(p->list);
     free(p);
@@ -75,6 +71,7 @@ static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
         if (mesh->facet_kind[k] == FACET_OPEN)
             p->pinned[silt_group_find(parent, mesh->facet[k][0])] = 0;
     free(parent);
+    p->pinned_revision = mesh->revision;
 }
 
 // lower triangle of the matrix, by columns: nodes at distance two, or neighbours only
@@ -197,28 +194,6 @@ static void column_laplacian(silt_pressure *p, const silt_fluid *f, const silt_m
     }
 }
 
-// the compact matrix knows the free surface by this: G carries a constant pressure to nodes on the boundary only
-static void boundary_diagonal(silt_pressure *p, silt_fluid *f, const silt_mesh *mesh) {
-    const int D = f->dim;
-    double *normal = f->scratch;
-    memset(normal, 0, (size_t)(D * p->n) * sizeof(double));
-    for (int e = 0; e < mesh->n_cell; e++)
-        for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++)
-                normal[D * mesh->cell[e][a] + d] += f->flux[(D + 1) * D * e + D * a + d];
-    // openings with a level give their pressure as the surface does
-    for (int k = 0; k < mesh->n_facet; k++)
-        for (int a = 0; a < D && mesh->facet_kind[k] == FACET_OPEN; a++)
-            p->extra[mesh->facet[k][a]] = 1;
-    for (int i = 0; i < p->n; i++) {
-        silt_hold_project(f, i, normal + D * i);
-        double square = 0;
-        for (int d = 0; d < D; d++)
-            square += silt_square(normal[D * i + d]);
-        p->extra[i] = mesh->surface[i] || p->extra[i] > 0 ? square / f->inertia[i] : 0;
-    }
-}
-
 static silt_status system_factor(silt_system *system, const silt_fluid *f, const silt_step *s, bool fresh, silt_error *err) {
     bool done;
     if (fresh)
@@ -259,23 +234,16 @@ static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step
     return system_factor(system, f, s, fresh, err);
 }
 
-silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
+// 2-D, and the Laplacian in 3-D
+static silt_status factor_main(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
-    const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
-    const bool compact = f->dim == 3 || !consistent;
+    const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT, compact = !consistent;
     silt_system *system = &p->main;
     const bool fresh = system->revision != mesh->revision || !system->factor.inside || system->compact != compact;
-    p->n = mesh->n_node;
-    if (fresh) {
+    if (fresh)
         pattern_build(p, system, mesh, f->dim, compact);
-        pin_closed(p, mesh);
-    }
-    SILT_RESERVE(p->extra, p->extra_capacity, p->n + 1);
-    memset(p->extra, 0, (size_t)p->n * sizeof *p->extra);
     if (!compact)
         gradient_assemble(p, f, mesh);
-    else if (consistent)
-        boundary_diagonal(p, f, mesh);
 
     const int *start = system->factor.start, *index = system->factor.index;
     double *value = system->factor.value;
@@ -286,15 +254,13 @@ silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_ste
                 column_consistent(p, f, mesh, j);
             column_laplacian(p, f, mesh, j, compact);
         }
-        p->row[j] += p->extra[j];
         double *diagonal = &value[start[j]];
         for (int k = start[j]; k < start[j + 1]; k++)
             value[k] = p->row[index[k]];
-        p->extra[j] = p->pinned[j] ? *diagonal : 1e-9 * *diagonal;
         if (!mesh->wet[j])
             *diagonal = 1;
         else
-            *diagonal += p->extra[j]; // a crumb between held nodes knows its pressure up to a constant too
+            *diagonal += (p->pinned[j] ? 1 : 1e-9) * *diagonal; // a crumb between held nodes knows its pressure up to a constant too
         if (!consistent && mesh->surface[j]) // pressure increment prescribed on the free surface
             *diagonal += 1e12 * fabs(*diagonal);
         // clear what this column touched
@@ -306,7 +272,17 @@ silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_ste
         }
         p->row[j] = 0;
     }
-    SILT_TRY(system_factor(system, f, s, fresh, err));
+    return system_factor(system, f, s, fresh, err);
+}
+
+silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
+    p->n = s->mesh->n_node;
+    if (p->pinned_revision != s->mesh->revision || !p->pinned)
+        pin_closed(p, s->mesh);
+    p->rows = f->dim == 3 && s->scene->fluid.pressure == PRESSURE_CONSISTENT;
+    if (p->rows)
+        return silt_space_build(&p->space, f, s, p->pinned, stiff, err);
+    SILT_TRY(factor_main(p, f, s, err));
     return stiff ? factor_stiff(p, f, s, err) : SILT_OK;
 }
 
@@ -316,67 +292,12 @@ static silt_status factor_solve(silt_system *system, const double *right, double
     return SILT_OK;
 }
 
-// out = (G^T P G / inertia + L) x, without assembling it
-static void operator_apply(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh, const double *x, double *out) {
-    const int D = f->dim;
-    memset(p->work, 0, (size_t)(D * p->n) * sizeof(double));
-    silt_assemble_pressure(f, mesh, x, p->work, NULL);
-    for (int i = 0; i < p->n; i++) {
-        silt_hold_project(f, i, p->work + D * i);
-        for (int d = 0; d < D; d++)
-            p->work[D * i + d] /= f->inertia[i];
-    }
-    silt_assemble_divergence(f, mesh, p->work, x, out);
-    for (int i = 0; i < p->n; i++)
-        out[i] = mesh->wet[i] ? out[i] + p->extra[i] * x[i] : x[i];
-}
-
-static double dot(int n, const double *a, const double *b) {
-    double sum = 0;
-    for (int i = 0; i < n; i++)
-        sum += a[i] * b[i];
-    return sum;
-}
-
-#define CG_LIMIT 400
-
-silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step *s, const double *right, double tolerance,
-                                double *x, silt_error *err) {
-    const int n = p->n;
-    if (!p->main.compact || s->scene->fluid.pressure != PRESSURE_CONSISTENT)
-        return factor_solve(&p->main, right, x, err);
-    for (int k = 0; k < 4; k++)
-        SILT_RESERVE(p->cg[k], p->cg_capacity[k], n + 1);
-    SILT_RESERVE(p->work, p->work_capacity, f->dim * n + 1);
-    double *r = p->cg[0], *z = p->cg[1], *d = p->cg[2], *ad = p->cg[3];
-    memcpy(r, right, (size_t)n * sizeof *r);
-    memset(x, 0, (size_t)n * sizeof *x);
-    SILT_TRY(factor_solve(&p->main, r, z, err));
-    memcpy(d, z, (size_t)n * sizeof *d);
-    double rz = dot(n, r, z);
-    const double target = silt_square(tolerance) * rz;
-    for (int k = 0; rz > target && rz > 0; k++) {
-        if (k == CG_LIMIT)
-            return silt_fail(err, SILT_FAILED, "the pressure system did not converge in %d iterations (%d nodes)", CG_LIMIT, n);
-        SILT_CLOCKED(apply, operator_apply(p, f, s->mesh, d, ad));
-        const double curvature = dot(n, d, ad);
-        if (!(curvature > 0))
-            return silt_fail(err, SILT_FAILED, "the pressure operator is not positive definite (%d nodes)", n);
-        const double alpha = rz / curvature;
-        for (int i = 0; i < n; i++) {
-            x[i] += alpha * d[i];
-            r[i] -= alpha * ad[i];
-        }
-        SILT_TRY(factor_solve(&p->main, r, z, err));
-        const double fresh = dot(n, r, z), beta = fresh / rz;
-        for (int i = 0; i < n; i++)
-            d[i] = z[i] + beta * d[i];
-        rz = fresh;
-        f->pressure_iterations++;
-    }
-    return SILT_OK;
+silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const double *right, double tolerance, double *x, silt_error *err) {
+    if (p->rows)
+        return silt_space_solve(p->space, right, tolerance, x, &f->pressure_iterations, err);
+    return factor_solve(&p->main, right, x, err);
 }
 
 silt_status silt_pressure_solve_stiff(silt_pressure *p, const double *right, double *increment, silt_error *err) {
-    return factor_solve(&p->stiff, right, increment, err);
+    return p->rows ? silt_space_solve_stiff(p->space, right, increment, err) : factor_solve(&p->stiff, right, increment, err);
 }
