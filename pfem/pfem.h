@@ -233,6 +233,7 @@ typedef struct silt_memory {
     int n_node, flag_capacity, dead_capacity;
     uint8_t *interior; // owned, one per node: had cells and no free facet
     uint8_t *dead;     // owned, one per node: leaves the cloud at the rebuild; NODE_LEFT: takes its water out of the domain
+    struct silt_delaunay *kept; // owned, the plane's triangulation (delaunay.h), which follows the nodes
     double reconnected;     // m3, volume that the rebuild itself made (positive) or lost
     double left;            // m3, volume that went with the nodes that left
     int flat;               // 3-D: cells flatter than a fiftieth of h that could not be mended

@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "delaunay.h"
-#include "pfem.h"
+#include "remesh.h"
 #include "scene_text.h"
 
 #define HEAD "silt: 1\ndimension: 2\ntime: {end: 1, output: 1}\ngravity: [0, -9.81]\n"
@@ -81,6 +81,68 @@ static void test_delaunay(void **state) {
     assert_int_equal(silt_delaunay_2d(3, line, &triangle, &n), 0);
     assert_int_equal(n, 0);
     free(triangle);
+}
+
+// A cloud with flat sides, hollows and ties without number that moves, loses nodes and gains some: what follows it is at every
+// step the triangulation that a new one is, ties included.
+static void test_delaunay_follows(void **state) {
+    (void)state;
+    enum { SIDE = 20, ROOM = 2 * SIDE * SIDE, STEPS = 300 };
+    static double x[2 * ROOM];
+    static uint8_t dead[ROOM];
+    static int map[ROOM], fresh[6 * ROOM][4], followed[6 * ROOM][4];
+    uint64_t random = 5;
+    silt_delaunay *kept = NULL;
+    int n = 0, n_same = 0;
+    for (int j = 0; j < SIDE; j++)
+        for (int i = 0; i < SIDE; i++)
+            if (i < 8 || j < 6 || i > 14) {
+                x[2 * n] = i;
+                x[2 * n++ + 1] = j;
+            }
+    for (int step = 0; step < STEPS; step++) {
+        memset(dead, 0, sizeof dead);
+        // at rest; all along on the lattice; on their way; far
+        const double reach = step < 3 ? 0 : step % 50 == 49 ? 3 : 0.004 * (step % 20);
+        for (int i = 0; i < n; i++) {
+            dead[i] = step > 1 && silt_uniform(&random) < 0.01;
+            for (int d = 0; d < 2; d++) {
+                const double at = x[2 * i + d];
+                if (at > 0 && at < SIDE - 1) // sides stay straight
+                    x[2 * i + d] = silt_clamp(at + reach * (silt_uniform(&random) - 0.5), 0, SIDE - 1);
+                if (step % 25 == 24)
+                    x[2 * i + d] = round(8 * x[2 * i + d]) / 8; // ties again
+            }
+        }
+        for (int k = 0; step > 0 && k < 4 && n < ROOM; k++, n++)
+            for (int d = 0; d < 2; d++)
+                x[2 * n + d] = round(16 * (SIDE - 1) * silt_uniform(&random)) / 16;
+        for (int i = 0; i < n; i++) // no two at one place
+            for (int k = 0; k < i; k++)
+                if (!dead[i] && !dead[k] && x[2 * i] == x[2 * k] && x[2 * i + 1] == x[2 * k + 1])
+                    dead[i] = 1;
+        int *found, n_found, *again, n_again, m = 0;
+        assert_int_equal(silt_delaunay_follow(&kept, n, x, dead, &found, &n_found), 0);
+        for (int i = 0; i < n; i++)
+            map[i] = dead[i] ? -1 : m++;
+        for (int k = 0; k < 3 * n_found; k++)
+            found[k] = map[found[k]];
+        for (int i = 0; i < n; i++)
+            if (!dead[i])
+                memmove(x + 2 * map[i], x + 2 * i, 2 * sizeof *x);
+        silt_delaunay_renumber(kept, map, m);
+        n = m;
+        assert_int_equal(silt_delaunay_2d(n, x, &again, &n_again), 0);
+        assert_int_equal(n_found, n_again);
+        silt_cells_sort(n, 3, n_found, found, followed);
+        silt_cells_sort(n, 3, n_again, again, fresh);
+        assert_memory_equal(followed, fresh, (size_t)n_found * sizeof *fresh);
+        n_same += silt_delaunay_followed(kept);
+        free(found);
+        free(again);
+    }
+    assert_in_range(n_same, STEPS / 2, STEPS - 2); // and now and then it is one
+    silt_delaunay_free(&kept);
 }
 
 static void test_first_mesh_fills_the_region(void **state) {
@@ -228,6 +290,7 @@ static void test_locate(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_delaunay),
+        cmocka_unit_test(test_delaunay_follows),
         cmocka_unit_test(test_first_mesh_fills_the_region),
         cmocka_unit_test(test_flips_book_nothing),
         cmocka_unit_test(test_volume_and_debt_close),

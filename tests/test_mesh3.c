@@ -552,7 +552,9 @@ static void test_slide_along_a_wall_books_nothing(void **state) {
         b.nodes.x[dim * pressed + dim - 1] = 0.03 * b.scene.fluid.size;
         rebuild(&b);
         const double lost = 1 - silt_mesh_volume(&b.mesh, b.nodes.x);
-        assert_true(lost > 0 && fabs(debts(&b) - lost) < 1e-14);
+        // in space; in the plane the flat cell under the node is water, and what is lost is rounding
+        assert_true(dim == 3 ? lost > 1e-9 : fabs(lost) < 1e-14);
+        assert_true(fabs(debts(&b) - lost) < 1e-14);
         double away = 0;
         for (int i = 0; i < b.nodes.count; i++) {
             double square = 0;

@@ -1,164 +1,57 @@
 // integrals over the cells; every kernel is written once and compiled for two and for three dimensions
 #include "fluid.h"
+#include "kernel.h"
 
-#define FLAT_STEP 0.05 // a cell that shrinks below this share on its way keeps the shape it had at the start
-#define SLIVER 0.02    // gradients of a tetrahedron are bounded as if its volume were this share of a regular one's
-
-#define KERNEL static inline __attribute__((always_inline)) void
-#define BY_DIM(kernel, ...)                                                                                            \
-    do {                                                                                                               \
-        if (f->dim == 3)                                                                                               \
-            kernel(3, __VA_ARGS__);                                                                                    \
-        else                                                                                                           \
-            kernel(2, __VA_ARGS__);                                                                                    \
-    } while (0)
-
-// corners of a cell, joined the shortest way across a periodic border
-KERNEL gather(const int D, const silt_mesh *mesh, const double *x, const int *cell, double c[4][3]) {
+// a cell's V grad N_a, and nodal vectors: copies, since the compiler must read anew after every store what it may have changed
+KERNEL cell_flux(const int D, const silt_fluid *f, int e, double g[4][3]) {
     for (int a = 0; a <= D; a++)
         for (int d = 0; d < D; d++)
-            c[a][d] = x[D * cell[a] + d];
-    if (mesh->period[0] > 0)
-        for (int a = 1; a <= D; a++)
-            c[a][0] -= mesh->period[0] * floor((c[a][0] - c[0][0]) / mesh->period[0] + 0.5);
+            g[a][d] = f->flux[((D + 1) * e + a) * D + d];
 }
 
-// volume and V grad N_a
-static inline __attribute__((always_inline)) double shape(const int D, double c[4][3], double flux[4][3]) {
-    memset(flux, 0, 12 * sizeof(double));
-    if (D == 2) {
-        flux[0][0] = 0.5 * (c[1][1] - c[2][1]);
-        flux[0][1] = 0.5 * (c[2][0] - c[1][0]);
-        flux[1][0] = 0.5 * (c[2][1] - c[0][1]);
-        flux[1][1] = 0.5 * (c[0][0] - c[2][0]);
-        flux[2][0] = 0.5 * (c[0][1] - c[1][1]);
-        flux[2][1] = 0.5 * (c[1][0] - c[0][0]);
-        return 0.5 * ((c[1][0] - c[0][0]) * (c[2][1] - c[0][1]) - (c[1][1] - c[0][1]) * (c[2][0] - c[0][0]));
+// The V grad N_a of a cell add up to nought: sums over its nodes are sums over all but the first, of differences from the first.
+// A quarter to a third less to multiply.
+KERNEL cell_slope(const int D, double g[4][3], const double p[4], double slope[3]) {
+    for (int d = 0; d < D; d++) {
+        slope[d] = (p[1] - p[0]) * g[1][d];
+        for (int a = 2; a <= D; a++)
+            slope[d] += (p[a] - p[0]) * g[a][d];
     }
-    double u[3][3];
-    for (int a = 0; a < 3; a++)
-        for (int d = 0; d < 3; d++)
-            u[a][d] = c[a + 1][d] - c[0][d];
-    for (int d = 0; d < 3; d++)
-        flux[0][d] = 0;
-    for (int a = 0; a < 3; a++) {
-        const double *p = u[(a + 1) % 3], *q = u[(a + 2) % 3];
-        flux[a + 1][0] = (p[1] * q[2] - p[2] * q[1]) / 6;
-        flux[a + 1][1] = (p[2] * q[0] - p[0] * q[2]) / 6;
-        flux[a + 1][2] = (p[0] * q[1] - p[1] * q[0]) / 6;
-        for (int d = 0; d < 3; d++)
-            flux[0][d] -= flux[a + 1][d];
-    }
-    return u[0][0] * flux[1][0] + u[0][1] * flux[1][1] + u[0][2] * flux[1][2];
 }
 
-// 1/volume; of a tetrahedron that is flat for its edges that of a fuller one
-static inline __attribute__((always_inline)) double bounded_inverse(const int D, double c[4][3], double volume) {
-    if (D == 2)
-        return 1 / volume;
-    double square = 0;
-    for (int a = 0; a < 4; a++)
-        for (int b = a + 1; b < 4; b++)
-            square += silt_square(c[b][0] - c[a][0]) + silt_square(c[b][1] - c[a][1]) + silt_square(c[b][2] - c[a][2]);
-    const double edge = sqrt(square / 6);
-    return 1 / silt_max(volume, SLIVER * 0.1178511 * edge * edge * edge);
+KERNEL cell_nodal(const int D, const double *x, const int *cell, double v[4][3]) {
+    for (int a = 0; a <= D; a++)
+        for (int d = 0; d < D; d++)
+            v[a][d] = x[D * cell[a] + d];
 }
 
-KERNEL geometry(const int D, silt_fluid *f, const silt_step *s, double dt) {
-    const silt_mesh *mesh = s->mesh;
-    const double rho = s->scene->fluid.density, theta_dt = f->theta * s->dt;
-    const double *solid = s->drag ? s->drag->solid : NULL, *x = s->nodes->x;
-    for (int k = 0; k < D * f->n_node; k++)
-        f->x_mid[k] = x[k] + 0.5 * dt * silt_mesh_velocity(f, k);
-    for (int i = 0; i < f->n_node; i++)
-        f->mass[i] = f->volume[i] = 0;
+KERNEL pressure(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, const double *shares, double *lost) {
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        double c[4][3], flux[4][3];
-        gather(D, mesh, x, cell, c);
-        const double start = shape(D, c, flux);
-        double volume = start, inverse = bounded_inverse(D, c, start);
-        if (dt > 0) {
-            double m[4][3], middle[4][3];
-            gather(D, mesh, f->x_mid, cell, m);
-            const double moved = shape(D, m, middle);
-            const bool whole = moved > FLAT_STEP * start;
-            if (whole) {
-                volume = moved;
-                inverse = bounded_inverse(D, m, moved);
-            }
-            if (whole || D == 3)
-                memcpy(flux, middle, sizeof flux);
-            if (D == 3) { // fluxes are quadratic in time: their mean over the step is that in the middle and a third of this
-                double way[4][3], more[4][3];
-                for (int a = 0; a < 4; a++)
-                    for (int d = 0; d < 3; d++)
-                        way[a][d] = m[a][d] - c[a][d];
-                shape(D, way, more);
-                for (int a = 0; a < 4; a++)
-                    for (int d = 0; d < 3; d++)
-                        flux[a][d] += more[a][d] / 3;
-            }
+        const double *share = shares ? shares + (D + 1) * e : NULL;
+        double g[4][3], slope[3] = {0}, mean = 0, sum = 0;
+        cell_flux(D, f, e, g);
+        for (int a = 0; a <= D; a++)
+            mean += p[cell[a]];
+        mean *= 1.0 / (D + 1);
+        for (int a = 0; a <= D && shares; a++) {
+            sum += share[a];
+            for (int d = 0; d < D; d++)
+                slope[d] += p[cell[a]] * g[a][d];
         }
-        f->cell_volume[e] = volume;
-        f->inverse[e] = inverse;
-        double *out = f->flux + (D + 1) * D * e;
         for (int a = 0; a <= D; a++)
             for (int d = 0; d < D; d++)
-                out[D * a + d] = flux[a][d];
-        // square of the edge, as twice the area of a triangle
-        const double square = D == 2 ? 2 / inverse : 0.866 * cbrt(silt_square(8.4853 / inverse));
-        f->tau[e] = 1 / (2 * rho / theta_dt + 8 * f->mu[e] / (3 * square));
-        for (int a = 0; a <= D; a++) {
-            double share = 0;
-            if (solid) {
-                for (int b = 0; b <= D; b++)
-                    share += solid[cell[b]] * (a == b ? 2 : 1) / ((D + 1) * (D + 2));
-                f->share[(D + 1) * e + a] = share;
-            }
-            f->volume[cell[a]] += volume / (D + 1);
-            f->mass[cell[a]] += rho * volume * (1.0 / (D + 1) - share);
-        }
-    }
-    for (int i = 0; i < f->n_node; i++)
-        f->inertia[i] = mesh->wet[i] ? f->mass[i] / theta_dt + (s->drag ? s->drag->coefficient[i] : 0) + f->friction[i] : 1;
-}
-
-void silt_assemble_geometry(silt_fluid *f, const silt_step *step, double dt) {
-    BY_DIM(geometry, f, step, dt);
-    if (f->wall_normals.n_row)
-        silt_hold_bent(f, step);
-    for (int i = 0; f->potential && i < f->n_node; i++)
-        f->potential[i] = step->scene->fluid.density * silt_formula_potential(&step->scene->fluid.force, f->x_mid + f->dim * i);
-}
-
-KERNEL pressure(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, double *lost) {
-    for (int e = 0; e < f->n_cell; e++) {
-        const int *cell = mesh->cell[e];
-        const double *flux = f->flux + (D + 1) * D * e, *share = f->share ? f->share + (D + 1) * e : NULL;
-        double mean = 0;
-        for (int a = 0; a <= D; a++)
-            mean += p[cell[a]] / (D + 1);
-        for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++)
-                out[D * cell[a] + d] += flux[D * a + d] * mean;
-        if (share)
-            for (int d = 0; d < D; d++) {
-                double slope = 0, sum = 0;
-                for (int a = 0; a <= D; a++)
-                    slope += p[cell[a]] * flux[D * a + d];
-                for (int a = 0; a <= D; a++) {
-                    out[D * cell[a] + d] += share[a] * slope;
-                    sum += share[a];
-                }
-                if (lost)
-                    lost[d] += slope * sum;
-            }
+                out[D * cell[a] + d] += shares ? g[a][d] * mean + share[a] * slope[d] : g[a][d] * mean;
+        for (int d = 0; d < D && shares && lost; d++)
+            lost[d] += slope[d] * sum;
     }
 }
 
 void silt_assemble_pressure(const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, double *lost) {
-    BY_DIM(pressure, f, mesh, p, out, lost);
+    if (f->share)
+        BY_DIM(pressure, f, mesh, p, out, f->share, lost);
+    else
+        BY_DIM(pressure, f, mesh, p, out, NULL, NULL);
 }
 
 KERNEL potential(const int D, const silt_fluid *f, const silt_mesh *mesh, double *out) {
@@ -177,29 +70,51 @@ KERNEL potential(const int D, const silt_fluid *f, const silt_mesh *mesh, double
 
 void silt_assemble_potential(const silt_fluid *f, const silt_mesh *mesh, double *out) { BY_DIM(potential, f, mesh, out); }
 
-KERNEL viscous(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, double factor, double *out) {
+// diagonal: NULL, or the operator's is added to it
+KERNEL viscous(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, double factor, double *out, double *diagonal) {
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        const double *flux = f->flux + (D + 1) * D * e;
-        double l[3][3] = {{0}}, trace = 0;
-        for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++)
-                for (int k = 0; k < D; k++)
-                    l[d][k] += v[D * cell[a] + d] * flux[D * a + k];
-        for (int d = 0; d < D; d++)
-            trace += l[d][d];
-        const double scale = factor * f->mu[e] * f->inverse[e];
+        double g[4][3], u[4][3], l[3][3], stress[3][3], trace = 0;
+        cell_flux(D, f, e, g);
+        cell_nodal(D, v, cell, u);
         for (int d = 0; d < D; d++)
             for (int k = 0; k < D; k++) {
-                const double stress = scale * (l[d][k] + l[k][d] - (d == k ? 2.0 / 3 * trace : 0));
-                for (int a = 0; a <= D; a++)
-                    out[D * cell[a] + d] += stress * flux[D * a + k];
+                l[d][k] = (u[1][d] - u[0][d]) * g[1][k];
+                for (int a = 2; a <= D; a++)
+                    l[d][k] += (u[a][d] - u[0][d]) * g[a][k];
             }
+        for (int d = 0; d < D; d++)
+            trace += l[d][d];
+        const double scale = f->mu[e] * f->inverse[e], force = factor * scale;
+        for (int d = 0; d < D; d++)
+            for (int k = 0; k <= d; k++)
+                stress[d][k] = stress[k][d] = force * (l[d][k] + l[k][d] - (d == k ? 2.0 / 3 * trace : 0));
+        for (int d = 0; d < D; d++) {
+            double rest = 0;
+            for (int a = 1; a <= D; a++) {
+                double sum = stress[d][0] * g[a][0];
+                for (int k = 1; k < D; k++)
+                    sum += stress[d][k] * g[a][k];
+                out[D * cell[a] + d] += sum;
+                rest += sum;
+            }
+            out[D * cell[0] + d] -= rest;
+        }
+        for (int a = 0; a <= D && diagonal; a++) {
+            double square = 0;
+            for (int d = 0; d < D; d++)
+                square += silt_square(g[a][d]);
+            diagonal[cell[a]] += (1 + 4.0 / (3 * D)) * scale * square;
+        }
     }
 }
 
 void silt_assemble_viscous(const silt_fluid *f, const silt_mesh *mesh, const double *v, double factor, double *out) {
-    BY_DIM(viscous, f, mesh, v, factor, out);
+    BY_DIM(viscous, f, mesh, v, factor, out, NULL);
+}
+
+void silt_assemble_viscous_both(const silt_fluid *f, const silt_mesh *mesh, const double *v, double *out, double *diagonal) {
+    BY_DIM(viscous, f, mesh, v, 1, out, diagonal);
 }
 
 KERNEL viscous_diagonal(const int D, const silt_fluid *f, const silt_mesh *mesh, double *diagonal) {
@@ -237,34 +152,47 @@ void silt_assemble_mass_excess(const silt_fluid *f, const silt_mesh *mesh, doubl
     BY_DIM(mass_excess, f, mesh, density, a, out);
 }
 
-KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p) {
+KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, const double *potential,
+                  const double *shares) {
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        const double *flux = f->flux + (D + 1) * D * e, *share = f->share ? f->share + (D + 1) * e : NULL;
-        double divergence = 0, carried[3] = {0}, stable[3];
+        const double *share = shares ? shares + (D + 1) * e : NULL;
+        double g[4][3], u[4][3], pi[4][3], head[4], divergence = 0, carried[3] = {0}, stable[3];
+        cell_flux(D, f, e, g);
+        cell_nodal(D, v, cell, u);
+        cell_nodal(D, f->projection, cell, pi);
         for (int a = 0; a <= D; a++)
+            head[a] = p[cell[a]] + (potential ? potential[cell[a]] : 0);
+        cell_slope(D, g, head, stable);
+        for (int a = 1; a <= D; a++)
             for (int d = 0; d < D; d++)
-                divergence += v[D * cell[a] + d] * flux[D * a + d];
-        if (share)
-            for (int a = 0; a <= D; a++)
-                for (int d = 0; d < D; d++)
-                    carried[d] += share[a] * v[D * cell[a] + d];
+                divergence += (u[a][d] - u[0][d]) * g[a][d];
+        for (int a = 0; a <= D && shares; a++)
+            for (int d = 0; d < D; d++)
+                carried[d] += share[a] * u[a][d];
+        const double weight = f->tau[e] * f->inverse[e], part = f->cell_volume[e] * (1.0 / (D + 1));
         for (int d = 0; d < D; d++) {
-            double slope = 0, mean = 0;
-            for (int a = 0; a <= D; a++) {
-                slope += (p[cell[a]] + (f->potential ? f->potential[cell[a]] : 0)) * flux[D * a + d];
-                mean += f->projection[D * cell[a] + d] / (D + 1);
-            }
-            stable[d] = f->tau[e] * f->inverse[e] * (slope + f->cell_volume[e] * mean);
+            double sum = 0;
+            for (int a = 0; a <= D; a++)
+                sum += pi[a][d];
+            stable[d] = weight * (stable[d] + part * sum);
         }
+        bool all = true;
+        for (int a = 0; a <= D; a++)
+            all &= f->mobile[cell[a]] == 1;
         for (int a = 0; a <= D; a++) {
-            double gain = divergence / (D + 1), smooth = 0;
+            double gain = divergence * (1.0 / (D + 1)), smooth = 0;
             for (int d = 0; d < D; d++) {
-                smooth += flux[D * a + d] * stable[d];
-                gain += flux[D * a + d] * carried[d];
+                smooth += g[a][d] * stable[d];
+                if (shares)
+                    gain += g[a][d] * carried[d];
             }
-            f->residual[cell[a]] += smooth;
-            *(f->mobile[cell[a]] == 1 ? &f->residual[cell[a]] : &f->withheld[cell[a]]) += gain;
+            if (all || f->mobile[cell[a]] == 1)
+                f->residual[cell[a]] += smooth + gain;
+            else {
+                f->residual[cell[a]] += smooth;
+                f->withheld[cell[a]] += gain;
+            }
         }
     }
 }
@@ -276,23 +204,27 @@ void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_d
         f->residual[j] = f->mobile[j] == 1 ? asked : 0;
         f->withheld[j] = f->mobile[j] == 1 ? 0 : asked;
     }
-    BY_DIM(continuity, f, mesh, v, p);
+    if (f->potential || f->share)
+        BY_DIM(continuity, f, mesh, v, p, f->potential, f->share);
+    else
+        BY_DIM(continuity, f, mesh, v, p, NULL, NULL);
 }
 
-KERNEL projection(const int D, silt_fluid *f, const silt_mesh *mesh, const double *p) {
+KERNEL projection(const int D, silt_fluid *f, const silt_mesh *mesh, const double *p, const double *potential) {
     memset(f->projection, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
     memset(f->projection_weight, 0, (size_t)f->n_node * sizeof(double));
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        const double *flux = f->flux + (D + 1) * D * e, weight = f->tau[e] * f->cell_volume[e];
+        const double tau = f->tau[e], weight = tau * f->cell_volume[e];
+        double g[4][3], head[4], slope[3];
+        cell_flux(D, f, e, g);
         for (int a = 0; a <= D; a++)
+            head[a] = p[cell[a]] + (potential ? potential[cell[a]] : 0);
+        cell_slope(D, g, head, slope);
+        for (int a = 0; a <= D; a++) {
             f->projection_weight[cell[a]] += weight;
-        for (int d = 0; d < D; d++) {
-            double slope = 0;
-            for (int a = 0; a <= D; a++)
-                slope += (p[cell[a]] + (f->potential ? f->potential[cell[a]] : 0)) * flux[D * a + d];
-            for (int a = 0; a <= D; a++)
-                f->projection[D * cell[a] + d] -= f->tau[e] * slope;
+            for (int d = 0; d < D; d++)
+                f->projection[D * cell[a] + d] -= tau * slope[d];
         }
     }
     for (int i = 0; i < f->n_node; i++)
@@ -301,31 +233,49 @@ KERNEL projection(const int D, silt_fluid *f, const silt_mesh *mesh, const doubl
                 f->projection[D * i + d] /= f->projection_weight[i];
 }
 
-void silt_assemble_projection(silt_fluid *f, const silt_mesh *mesh, const double *p) { BY_DIM(projection, f, mesh, p); }
+void silt_assemble_projection(silt_fluid *f, const silt_mesh *mesh, const double *p) {
+    if (f->potential)
+        BY_DIM(projection, f, mesh, p, f->potential);
+    else
+        BY_DIM(projection, f, mesh, p, NULL);
+}
 
-KERNEL divergence(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, double *out) {
+KERNEL divergence(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, const double *shares,
+                  double *out) {
     memset(out, 0, (size_t)f->n_node * sizeof(double));
     for (int e = 0; e < f->n_cell; e++) {
         const int *cell = mesh->cell[e];
-        const double *flux = f->flux + (D + 1) * D * e, *share = f->share ? f->share + (D + 1) * e : NULL;
-        double sum = 0, carried[3] = {0}, slope[3] = {0};
+        const double *share = shares ? shares + (D + 1) * e : NULL;
+        double g[4][3], u[4][3], head[4], sum = 0, along[3];
+        cell_flux(D, f, e, g);
+        cell_nodal(D, v, cell, u);
         for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++) {
-                sum += v[D * cell[a] + d] * flux[D * a + d];
-                slope[d] += p[cell[a]] * flux[D * a + d];
-                if (share)
-                    carried[d] += share[a] * v[D * cell[a] + d];
-            }
-        const double weight = f->tau[e] * f->inverse[e];
-        for (int a = 0; a <= D; a++) {
-            double gain = sum / (D + 1);
+            head[a] = p[cell[a]];
+        cell_slope(D, g, head, along);
+        for (int a = 1; a <= D; a++)
             for (int d = 0; d < D; d++)
-                gain += flux[D * a + d] * (weight * slope[d] + carried[d]);
-            out[cell[a]] += gain;
+                sum += (u[a][d] - u[0][d]) * g[a][d];
+        sum *= 1.0 / (D + 1);
+        for (int d = 0; d < D; d++) {
+            along[d] *= f->tau[e] * f->inverse[e];
+            for (int a = 0; a <= D && shares; a++)
+                along[d] += share[a] * u[a][d];
         }
+        double rest = 0;
+        for (int a = 1; a <= D; a++) {
+            double flow = 0;
+            for (int d = 0; d < D; d++)
+                flow += g[a][d] * along[d];
+            out[cell[a]] += sum + flow;
+            rest += flow;
+        }
+        out[cell[0]] += sum - rest;
     }
 }
 
 void silt_assemble_divergence(const silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, double *out) {
-    BY_DIM(divergence, f, mesh, v, p, out);
+    if (f->share)
+        BY_DIM(divergence, f, mesh, v, p, f->share, out);
+    else
+        BY_DIM(divergence, f, mesh, v, p, NULL, out);
 }

@@ -8,15 +8,19 @@
 #define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
+#define FLUID_INNER 1e4     // accuracy of a pressure increment over that of the step, at least: refreshes are counted, so what an
+                            // increment lacks does not all come back
 
 void silt_fluid_clear(silt_fluid *f) {
-    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
+    double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->start, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
                        f->level_force, f->level_brake, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
-                       f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->normal, f->given, f->cg[0],
+                       f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->pressure_new, f->v_start, f->normal, f->given, f->cg[0],
                        f->cg[1], f->cg[2]};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
+    free(f->piece);
+    free(f->walk);
     free(f->hold);
     free(f->mobile);
     silt_pressure_free(&f->pressure);
@@ -50,6 +54,8 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         ROOM(given, D, have_nodes, need);
         for (int k = 0; k < 3; k++)
             ROOM(cg[k], D, have_nodes, need);
+        ROOM(v_start, D, have_nodes, need);
+        ROOM(pressure_new, 1, have_nodes, need);
         ROOM(projection_weight, 1, have_nodes, need);
         ROOM(mass, 1, have_nodes, need);
         ROOM(volume, 1, have_nodes, need);
@@ -68,6 +74,7 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         const int need = n_cell + n_cell / 2 + 64, have_cells = f->cell_capacity;
         ROOM(flux, (D + 1) * D, have_cells, need);
         ROOM(cell_volume, 1, have_cells, need);
+        ROOM(start, 1, have_cells, need);
         ROOM(inverse, 1, have_cells, need);
         ROOM(mu, 1, have_cells, need);
         ROOM(tau, 1, have_cells, need);
@@ -103,10 +110,7 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
 
 // mu theta dt/(rho h^2): the largest, and the mean over the water
 static double stiffness(const silt_fluid *f, const silt_step *s) {
-    double mu = 0;
-    for (int e = 0; e < f->n_cell; e++)
-        mu = silt_max(mu, f->mu[e]);
-    return mu * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
+    return f->mu_max * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
 }
 
 static double mean_stiffness(const silt_fluid *f, const silt_step *s) {
@@ -130,10 +134,10 @@ static void body_force(const silt_fluid *f, const silt_step *s, int i, double a[
 // Lumped masses make waves slow, by 0.3 % at 40 nodes a wave. One sweep towards the consistent mass: with the acceleration
 // a = M_l^-1 F the force gets (M_l - M_c) a, so that the mass's inverse is M_l^-1 (2 M_l - M_c) M_l^-1: symmetric, between 1 and
 // 1.75 times that of the lumped one, and the sum of the momenta stays what it is. Where viscosity is stiff its share is left out;
-// with grains, whose drag may be stiff, the masses stay lumped.
-static void find_excess(silt_fluid *f, const silt_step *s, const double *right) {
+// with grains, whose drag may be stiff, the masses stay lumped. After silt_momentum_look at w where there is viscosity.
+static void find_excess(silt_fluid *f, const silt_step *s, double stiff, const double *right) {
     const int D = f->dim;
-    const double theta_dt = f->theta * s->dt, stiff = stiffness(f, s), *v = s->nodes->v;
+    const double theta_dt = f->theta * s->dt, *v = s->nodes->v;
     double *a = f->cg[0];
     memset(f->excess, 0, (size_t)(D * f->n_node) * sizeof(double));
     if (s->drag)
@@ -144,7 +148,8 @@ static void find_excess(silt_fluid *f, const silt_step *s, const double *right) 
         for (int d = 0; d < D; d++)
             a[D * i + d] -= f->mass[i] * v[D * i + d] / theta_dt + (f->inertia[i] - f->mass[i] / theta_dt) * f->w[D * i + d];
     if (stiff > 0 && stiff < 0.1)
-        silt_assemble_viscous(f, s->mesh, f->w, stiff / 0.1 - 1, a);
+        for (int k = 0; k < D * f->n_node; k++)
+            a[k] += (stiff / 0.1 - 1) * f->scratch[k];
     for (int i = 0; i < f->n_node; i++) {
         for (int d = 0; d < D; d++)
             a[D * i + d] = s->mesh->wet[i] && f->mass[i] > 0 ? a[D * i + d] / f->mass[i] : 0;
@@ -163,10 +168,10 @@ static void find_excess(silt_fluid *f, const silt_step *s, const double *right) 
 // force on the nodes but for inertia, viscosity and drag's own share: M v/(theta dt) + M g + push + G p
 static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, double *out) {
     const int D = f->dim;
-    const double theta_dt = f->theta * s->dt, *v = s->nodes->v, *g = s->scene->gravity;
+    const double per_time = 1 / (f->theta * s->dt), *v = s->nodes->v, *g = s->scene->gravity;
     for (int i = 0; i < f->n_node; i++)
         for (int d = 0; d < D; d++)
-            out[D * i + d] = f->mass[i] * (v[D * i + d] / theta_dt + g[d]) + (s->drag ? s->drag->push[D * i + d] : 0);
+            out[D * i + d] = f->mass[i] * (v[D * i + d] * per_time + g[d]) + (s->drag ? s->drag->push[D * i + d] : 0);
     if (s->scene->fluid.force.kind != FORMULA_NONE)
         for (int i = 0; i < f->n_node; i++) {
             double a[3];
@@ -199,15 +204,20 @@ static void resist(silt_fluid *f, const silt_step *s) {
     if (f->level_force)
         silt_levels_load(f, s);
     silt_assemble_geometry(f, s, s->dt);
-    if (silt_viscosity_varies(s->scene) && (f->iterations < FLUID_CLOSURE || s->scene->fluid.rheology != RHEOLOGY_NEWTONIAN))
+    if (silt_viscosity_varies(s->scene) && (f->iterations < FLUID_CLOSURE || s->scene->fluid.rheology != RHEOLOGY_NEWTONIAN)) {
         silt_viscosity_update(s->scene, s->nodes, s->mesh, &f->depth, f->flux, f->inverse, f->w, f->iterations ? 0.5 : 1, f->mu,
                               &f->viscosity);
+        f->mu_max = 0;
+        for (int e = 0; e < f->n_cell; e++)
+            f->mu_max = silt_max(f->mu_max, f->mu[e]);
+    }
 }
 
 // what resistance needs once a step
 static void resist_begin(silt_fluid *f, const silt_step *s) {
     for (int e = 0; e < f->n_cell; e++)
         f->mu[e] = s->scene->fluid.viscosity;
+    f->mu_max = f->n_cell ? s->scene->fluid.viscosity : 0;
     memset(f->friction, 0, (size_t)f->n_node * sizeof *f->friction);
     if (silt_viscosity_varies(s->scene))
         silt_depth_update(&f->depth, s->scene, s->walls, s->nodes, s->mesh, s->nodes->x);
@@ -221,19 +231,23 @@ static void resist_begin(silt_fluid *f, const silt_step *s) {
         SILT_RESERVE(f->wall_force, f->wall_capacity, f->dim * f->n_node + 1);
 }
 
-// velocity with the pressure of the last iterate, from the right side in f->force
-static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid, double drop, silt_error *err) {
+// velocity with the pressure of the last iterate, from the right side in f->force, after silt_momentum_look at w where there is
+// viscosity. solved: to all digits
+static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid, double drop, bool *solved, silt_error *err) {
+    *solved = true;
     const int D = f->dim;
     if (s->scene->fluid.scheme == SCHEME_IMPLICIT && viscid) {
         memcpy(f->star, f->w, (size_t)D * (size_t)f->n_node * sizeof(double));
         for (int i = 0; i < f->n_node && f->wall_normals.n_row; i++)
             silt_hold_impose(f, i, f->star + D * i); // normals that have changed with the midpoint mesh
         silt_status status;
-        SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, drop, f->star, err));
+        if (f->wall_normals.n_row)
+            SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->star));
+        SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, drop, f->star, solved, err));
         SILT_TRY(status);
     } else {
-        if (viscid)
-            silt_assemble_viscous(f, s->mesh, f->w, -1, f->force);
+        for (int k = 0; k < D * f->n_node && viscid; k++)
+            f->force[k] -= f->scratch[k];
         for (int i = 0; i < f->n_node; i++) {
             const double stand = viscid ? f->stand[i] : 0;
             for (int d = 0; d < D; d++)
@@ -294,12 +308,13 @@ static void correct(silt_fluid *f, const silt_step *s, const double *q, double *
     }
 }
 
-// increment = -matrix^-1 residual
+// increment = -matrix^-1 residual, in 3-D to `tolerance`, or to what is worth having where the step is solved far
 static silt_status pressure_increment(silt_fluid *f, const silt_step *s, double tolerance, silt_error *err) {
     silt_status status;
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
-    SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, s, f->residual, tolerance, f->increment, err));
+    tolerance = silt_min(tolerance, FLUID_INNER * s->scene->fluid.tolerance);
+    SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, f->residual, tolerance, f->increment, err));
     return status;
 }
 
@@ -343,8 +358,9 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
         any = f->rate[i] != 0;
     memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);
     for (int pass = 0; pass < 2 && any; pass++) {
-        memset(f->increment, 0, (size_t)f->n_node * sizeof *f->increment);
-        silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
+        memset(pass ? f->increment : f->residual, 0, (size_t)f->n_node * sizeof(double));
+        if (pass) // at first there is none
+            silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
         for (int i = 0; i < f->n_node; i++)
             f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
         SILT_TRY(pressure_increment(f, s, 0.03, err));
@@ -360,16 +376,21 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
     const double dt = s->dt, *v = s->nodes->v;
     double *out = f->reaction, lost[3] = {0}, unbalanced[3] = {0};
     momentum_right(f, s, p, out);
+    memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
+    silt_assemble_viscous(f, s->mesh, f->w, 1, f->scratch);
+    f->dissipated = 0;
     for (int i = 0; i < f->n_node; i++)
-        for (int d = 0; d < D; d++)
-            out[D * i + d] = f->inertia[i] * f->w[D * i + d] - out[D * i + d] - f->excess[D * i + d];
-    silt_assemble_viscous(f, s->mesh, f->w, 1, out);
+        for (int d = 0; d < D; d++) {
+            const int k = D * i + d;
+            out[k] = f->inertia[i] * f->w[k] - out[k] - f->excess[k] + f->scratch[k];
+            f->dissipated += dt * f->scratch[k] * f->w[k]; // w . K w
+        }
 
     memset(f->from_grains, 0, sizeof f->from_grains);
     f->momentum_scale = 0;
     f->worked = 0;
-    memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
-    silt_assemble_pressure(f, s->mesh, p, f->scratch, lost);
+    if (drag)
+        silt_assemble_pressure(f, s->mesh, p, f->scratch, lost);
     for (int i = 0; i < f->n_node; i++) {
         if (!s->mesh->wet[i]) {
             for (int d = 0; d < D; d++)
@@ -407,13 +428,6 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
         for (int d = 0; d < D && s->mesh->wet[i]; d++)
             out[D * i + d] += f->wall_force[D * i + d] - f->friction[i] * f->w[D * i + d];
     }
-
-    // viscous dissipation w . K w
-    memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
-    silt_assemble_viscous(f, s->mesh, f->w, 1, f->scratch);
-    f->dissipated = 0;
-    for (int k = 0; k < D * f->n_node; k++)
-        f->dissipated += dt * f->scratch[k] * f->w[k];
 }
 
 // stiff viscosity: the pressure's operator is nearly the mass matrix over the viscosity, its inverse adds to that of S + L
@@ -444,9 +458,7 @@ static silt_status astray_node(const silt_fluid *f, const silt_step *s, silt_err
 // The trapezoidal rule turns the sign of modes that viscosity brings to rest within the step and hardly damps them: where
 // N = mu dt/(rho h^2) is large the step goes over to backward Euler, whose error such modes do not feel.
 static bool choose_theta(silt_fluid *f, const silt_step *s) {
-    double mu = 0;
-    for (int e = 0; e < f->n_cell && s->scene->fluid.flow == FLOW_LAMINAR; e++)
-        mu = silt_max(mu, f->mu[e]);
+    const double mu = s->scene->fluid.flow == FLOW_LAMINAR ? f->mu_max : 0;
     const double number = mu * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
     const double before = f->theta;
     if (number > FLUID_DAMPED)
@@ -502,10 +514,11 @@ static double swirl(const silt_fluid *f, const silt_step *s) {
 // ones, or still water starts to swirl. @return what to multiply it by
 static double strictness(const silt_fluid *f, const silt_step *s) {
     const double h = s->scene->fluid.size;
-    double fastest = sqrt(h * silt_length(3, s->scene->gravity));
+    double square = h * silt_length(3, s->scene->gravity);
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i])
-            fastest = silt_max(fastest, silt_length(f->dim, s->nodes->v + f->dim * i));
+            square = silt_max(square, silt_dot(f->dim, s->nodes->v + f->dim * i, s->nodes->v + f->dim * i));
+    const double fastest = sqrt(square);
     const double least = silt_clamp(1e-12 / s->scene->fluid.tolerance, 0.01, 1); // rounding
     return fastest > 0 && !f->last_try ? silt_clamp(s->dt * fastest / (0.5 * h), least, 1) : 1;
 }
@@ -561,16 +574,21 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         const bool squeezed = s->pockets && silt_pockets_stiff(s->pockets, D, 0.5 * s->dt, f->mass) > 0.1;
         momentum_right(f, s, p, f->force);
         const bool refresh = (first && stiff <= FLUID_STIFF) || f->iterations < FLUID_REFRESH;
+        if (stiff > 0)
+            SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->w));
         if (refresh)
-            find_excess(f, s, f->force);
+            find_excess(f, s, stiff, f->force);
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
         // on the way the momentum is solved no further than it is worth; the iterate that ends it is solved out
         const double drop = def->scheme == SCHEME_IMPLICIT && f->iterations && before > 10 * strict * def->tolerance ? 1e-3 : 0;
-        SILT_TRY(velocity_star(f, s, stiff > 0, drop, err));
+        bool solved;
+        SILT_TRY(velocity_star(f, s, stiff > 0, drop, &solved, err));
         int worst_node = star_continuity(f, s, p);
-        if (stiff > 0 && drop > 0 && f->worst <= strict * def->tolerance) {
-            SILT_TRY(silt_momentum_solve(f, s, f->force, 0, f->star, err));
+        if (!solved && f->worst <= strict * def->tolerance) {
+            SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->star));
+            SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, 0, f->star, &solved, err));
+            SILT_TRY(status);
             worst_node = star_continuity(f, s, p);
         }
         const double *place = s->nodes->x + D * worst_node;
@@ -644,13 +662,14 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     resist_begin(f, s);
     if (f->shift)
         memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);
+    f->shaped = false;
     silt_assemble_geometry(f, s, s->dt);
     if (s->pockets)
         silt_pockets_load(s->pockets, s->mesh, f->x_mid);
     silt_debts_ask(f, s);
 
     // kept apart until the step is accepted
-    double *p = silt_alloc((size_t)f->n_node + 1, sizeof *p), *v = silt_alloc((size_t)(D * f->n_node) + 1, sizeof *v);
+    double *p = f->pressure_new, *v = f->v_start;
     memcpy(v, nodes->v, (size_t)D * (size_t)f->n_node * sizeof(double));
     for (int i = 0; i < f->n_node; i++)
         // with the Laplacian the surface's pressure is prescribed
@@ -681,7 +700,5 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         }
     } else
         memcpy(nodes->v, v, (size_t)D * (size_t)f->n_node * sizeof(double));
-    free(p);
-    free(v);
     return status;
 }

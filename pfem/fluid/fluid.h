@@ -1,8 +1,8 @@
 /** @file fluid.h
  * One step of the water: momentum, pressure, correction on the midpoint mesh (docs/method.md, "Fluid"), in 2-D and 3-D.
- * Rooms: fluid.c the step, hold.c what surroundings hold, assemble.c integrals over cells, tension.c the surface's pull,
- * momentum.c the viscous system,
- * pressure.c the pressure system, stiff.c both at once where viscosity is stiff, debt.c volume that is owed and water that cannot keep its volume.
+ * Rooms: fluid.c the step, hold.c what surroundings hold, geometry.c shapes of the cells, assemble.c integrals over them,
+ * tension.c the surface's pull, momentum.c the viscous system, pressure.c the pressure system, space.c and coarse.c that of 3-D,
+ * stiff.c both at once where viscosity is stiff, debt.c volume that is owed and water that cannot keep its volume.
  */
 #ifndef SILT_FLUID_H
 #define SILT_FLUID_H
@@ -33,6 +33,7 @@ typedef struct silt_fluid {
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
+    double *start;        // owned, per cell, volume where the nodes are
     double *inverse;      // owned, per cell, 1/volume, bounded in slivers: gradients are flux times this
     double *mu;           // owned, per cell, Pa s, effective viscosity
     double *tau;          // owned, per cell, stabilisation
@@ -60,6 +61,12 @@ typedef struct silt_fluid {
     double *given;        // owned, dim per node, velocity of what is held
     silt_wall_normals wall_normals; // owned, of nodes on bent walls
     double *cg[3];        // owned, dim per node, momentum solver
+    double *pressure_new, *v_start; // owned, 1 and dim per node: kept apart until the step is accepted
+    int *piece, *walk;    // owned, per node: lowest node of its piece of water; working space
+    int64_t piece_revision; // of the mesh that these pieces belong to
+    int piece_capacity, walk_capacity;
+    double mu_max;        // Pa s, largest of mu
+    bool shaped;          // shapes and x_mid are of this step
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned
     silt_stiff *stiff;    // owned
@@ -102,7 +109,11 @@ void silt_hold_bent(silt_fluid *fluid, const silt_step *step);
 /** silt_hold_impose; on bent walls the velocity keeps its size: turning does no work */
 void silt_hold_turn(const silt_fluid *fluid, int i, double *v);
 /** takes the held components out of a vector of dim numbers */
-void silt_hold_project(const silt_fluid *fluid, int i, double *v);
+void silt_hold_project_held(const silt_fluid *fluid, int i, double *v);
+static inline void silt_hold_project(const silt_fluid *f, int i, double *v) { // most are free: no call for them
+    if (f->hold[i] != HOLD_FREE)
+        silt_hold_project_held(f, i, v);
+}
 /** v with its held components replaced by the given ones */
 void silt_hold_impose(const silt_fluid *fluid, int i, double *v);
 
@@ -118,15 +129,20 @@ silt_hold silt_level_hold(const silt_step *step, int i, double vector[3]);
  * level_brake, the latter added to friction. */
 void silt_levels_load(silt_fluid *fluid, const silt_step *step);
 
-// assemble.c ---------------------------------------------------------------------------------------------
-/** geometry, masses and stabilisation on the mesh half way along dt w; dt = 0: where the nodes are */
+// geometry.c ---------------------------------------------------------------------------------------------
+/** Geometry, masses and stabilisation on the mesh half way along dt w; dt = 0: where the nodes are. Shapes are made anew only when
+ * a node's midpoint is another one, or not `shaped`. */
 void silt_assemble_geometry(silt_fluid *fluid, const silt_step *step, double dt);
+
+// assemble.c ---------------------------------------------------------------------------------------------
 /** out += G p; adds to lost (may be NULL) what acts on the grains */
 void silt_assemble_pressure(const silt_fluid *fluid, const silt_mesh *mesh, const double *p, double *out, double *lost);
 /** out -= int N_i grad potential: at rest the pressure answers it to rounding, on any mesh */
 void silt_assemble_potential(const silt_fluid *fluid, const silt_mesh *mesh, double *out);
 /** out += factor K v: viscous force, deviatoric */
 void silt_assemble_viscous(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, double factor, double *out);
+/** the same with factor 1, and diagonal += diagonal of K in one sweep */
+void silt_assemble_viscous_both(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, double *out, double *diagonal);
 /** diagonal += diagonal of K, its mean over the components */
 void silt_assemble_viscous_diagonal(const silt_fluid *fluid, const silt_mesh *mesh, double *diagonal);
 /** out += (lumped - consistent mass) a */
@@ -140,9 +156,13 @@ void silt_assemble_projection(silt_fluid *fluid, const silt_mesh *mesh, const do
 void silt_assemble_divergence(const silt_fluid *fluid, const silt_mesh *mesh, const double *v, const double *p, double *out);
 
 // momentum.c ---------------------------------------------------------------------------------------------
-/** (inertia + K) v = right on the free components; v holds the first guess with held components in place.
- * To six digits more than fluid.tolerance, or to `drop` times the residual of the first guess where that is more. */
-silt_status silt_momentum_solve(silt_fluid *fluid, const silt_step *step, const double *right, double drop, double *v,
+/** What a solve starts from, for the present geometry, viscosity and first guess: scratch = K v, increment = diagonal of inertia + K.
+ * Neither may be touched until then. */
+void silt_momentum_look(silt_fluid *fluid, const silt_mesh *mesh, const double *v);
+/** (inertia + K) v = right on the free components, after silt_momentum_look; v holds the first guess with held components in place.
+ * To six digits more than fluid.tolerance, or to `drop` times the residual of the first guess where that is more.
+ * @param solved  out, whether it got to the six digits */
+silt_status silt_momentum_solve(silt_fluid *fluid, const silt_step *step, const double *right, double drop, double *v, bool *solved,
                                 silt_error *err);
 
 // debt.c -------------------------------------------------------------------------------------------------
@@ -167,13 +187,13 @@ void silt_mix_next(silt_mix *mix, int dim, int n, const double *change, const do
 // pressure.c ------------------------------------------------------------------------------------------
 silt_pressure *silt_pressure_create(void);
 void silt_pressure_free(silt_pressure **pressure);
-/** Assembles and factors  sum_i G_i^T P_i G_i / inertia_i + L  (consistent) or its Laplacian counterpart; where that is too
- * dear (3-D) a compact matrix like it, which then preconditions conjugate gradients.
+/** Assembles  sum_i G_i^T P_i G_i / inertia_i + L  (consistent) or its Laplacian counterpart, and factors it; in 3-D the first is
+ * left to conjugate gradients (space.c).
  * stiff: the viscous counterpart is wanted too. Errors: SILT_FAILED when the matrix is not positive definite. */
 silt_status silt_pressure_factor(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, bool stiff, silt_error *err);
-/** increment = matrix^-1 right; iterations stop at `tolerance` relative to the right side */
-silt_status silt_pressure_solve(silt_pressure *pressure, silt_fluid *fluid, const silt_step *step, const double *right,
-                                double tolerance, double *increment, silt_error *err);
+/** increment = matrix^-1 right; conjugate gradients stop at `tolerance` relative to the right side. The mesh is that of the factor. */
+silt_status silt_pressure_solve(silt_pressure *pressure, silt_fluid *fluid, const double *right, double tolerance,
+                                double *increment, silt_error *err);
 /** increment = (3/(4 mu) M + L)^-1 right: the pressure's operator where viscosity outweighs inertia */
 silt_status silt_pressure_solve_stiff(silt_pressure *pressure, const double *right, double *increment, silt_error *err);
 /** forgets factors, so that a resumed run and one that went on hold the same */

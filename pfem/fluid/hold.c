@@ -3,10 +3,8 @@
 
 #define BED_FLUSH 0.866 // cosine of the largest turn, 30 degrees, between bed and a wall that goes on from it
 
-void silt_hold_project(const silt_fluid *f, int i, double *v) {
+void silt_hold_project_held(const silt_fluid *f, int i, double *v) {
     const int D = f->dim;
-    if (f->hold[i] == HOLD_FREE)
-        return;
     if (f->hold[i] == HOLD_ALL) {
         for (int d = 0; d < D; d++)
             v[d] = 0;

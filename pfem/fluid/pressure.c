@@ -1,8 +1,8 @@
-// the pressure system. 2-D: plane.c. 3-D: conjugate gradients on the same operator, applied
-// cell by cell, preconditioned by the factor of a compact Laplacian that resembles it
+// the pressure system. 2-D: plane.c, 3-D: space.c; with the Laplacian, and for stiff viscosity in 2-D, factored by CHOLMOD
 #include "factor.h"
 #include "fluid.h"
 #include "plane.h"
+#include "space.h"
 
 /** a symmetric matrix over nodes and their neighbours, and its factor */
 typedef struct silt_system {
@@ -11,16 +11,14 @@ typedef struct silt_system {
 } silt_system;
 
 struct silt_pressure {
-    silt_system main, stiff;   // a compact stand-in for S + L; L and the mass matrix over the viscosity
+    silt_system main, stiff;   // the Laplacian in place of S; L and the mass matrix over the viscosity
     silt_plane *plane;         // owned, S + L in 2-D
-    bool plain;                // it is that
+    silt_space *space;         // owned, S + L in 3-D
+    bool plain, rows;          // it is that
     int64_t pinned_revision;   // of the mesh that `pinned` belongs to
     int n;
     uint8_t *pinned;        // owned, one per node: the pressure level of a closed piece of water
     double *row;            // owned
-    double *extra;          // owned, per node: what pins closed water, added to the operator's diagonal
-    double *cg[4], *work;   // owned, conjugate gradients: 1 per node; dim per node
-    int cg_capacity[4], work_capacity, extra_capacity;
     int *group;             // owned, per node
     int pinned_capacity, row_capacity, group_capacity;
 };
@@ -44,10 +42,7 @@ void silt_pressure_free(silt_pressure **pressure) {
     silt_plane_free(&p->plane);
     free(p->pinned);
     free(p->row);
-    free(p->extra);
-    for (int k = 0; k < 4; k++)
-        free(p->cg[k]);
-    free(p->work);
+    silt_space_free(&p->space);
     free(p->group);
     free(p);
     *pressure = NULL;
@@ -116,28 +111,6 @@ static void column_laplacian(silt_pressure *p, const silt_fluid *f, const silt_m
     }
 }
 
-// the compact matrix knows the free surface by this: G carries a constant pressure to nodes on the boundary only
-static void boundary_diagonal(silt_pressure *p, silt_fluid *f, const silt_mesh *mesh) {
-    const int D = f->dim;
-    double *normal = f->scratch;
-    memset(normal, 0, (size_t)(D * p->n) * sizeof(double));
-    for (int e = 0; e < mesh->n_cell; e++)
-        for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++)
-                normal[D * mesh->cell[e][a] + d] += f->flux[(D + 1) * D * e + D * a + d];
-    // openings with a level give their pressure as the surface does
-    for (int k = 0; k < mesh->n_facet; k++)
-        for (int a = 0; a < D && mesh->facet_kind[k] == FACET_OPEN; a++)
-            p->extra[mesh->facet[k][a]] = 1;
-    for (int i = 0; i < p->n; i++) {
-        silt_hold_project(f, i, normal + D * i);
-        double square = 0;
-        for (int d = 0; d < D; d++)
-            square += silt_square(normal[D * i + d]);
-        p->extra[i] = mesh->surface[i] || p->extra[i] > 0 ? square / f->inertia[i] : 0;
-    }
-}
-
 static silt_status system_factor(silt_system *system, const silt_step *s, bool fresh, silt_error *err) {
     bool done;
     if (fresh)
@@ -177,30 +150,24 @@ static silt_status factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step
     return system_factor(system, s, fresh, err);
 }
 
-static silt_status factor_compact(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
+static silt_status factor_laplacian(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
-    const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
     silt_system *system = &p->main;
     const bool fresh = system->revision != mesh->revision || !system->factor.inside;
-    SILT_RESERVE(p->extra, p->extra_capacity, p->n + 1);
-    memset(p->extra, 0, (size_t)p->n * sizeof *p->extra);
     if (fresh)
         pattern_build(p, system, mesh);
-    if (consistent)
-        boundary_diagonal(p, f, mesh);
     const int *start = system->factor.start, *index = system->factor.index;
     double *value = system->factor.value;
     memset(p->row, 0, (size_t)p->n * sizeof *p->row);
     for (int j = 0; j < p->n; j++) {
         if (mesh->wet[j])
             column_laplacian(p, f, mesh, j, true);
-        p->row[j] += p->extra[j];
         double *diagonal = &value[start[j]];
         for (int k = start[j]; k < start[j + 1]; k++)
             value[k] = p->row[index[k]];
-        p->extra[j] = silt_pressure_pin(mesh, p->pinned, j, *diagonal);
-        *diagonal = mesh->wet[j] ? *diagonal + p->extra[j] : 1;
-        if (!consistent && mesh->surface[j]) // pressure increment prescribed on the free surface
+        const double pin = silt_pressure_pin(mesh, p->pinned, j, *diagonal);
+        *diagonal = mesh->wet[j] ? *diagonal + pin : 1;
+        if (mesh->surface[j]) // pressure increment prescribed on the free surface
             *diagonal += 1e12 * fabs(*diagonal);
         // clear what this column touched
         for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
@@ -211,11 +178,15 @@ static silt_status factor_compact(silt_pressure *p, silt_fluid *f, const silt_st
 }
 
 silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_step *s, bool stiff, silt_error *err) {
-    p->plain = f->dim == 2 && s->scene->fluid.pressure == PRESSURE_CONSISTENT;
+    const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
     p->n = s->mesh->n_node;
     if (!p->pinned || p->pinned_revision != s->mesh->revision)
         pin_closed(p, s->mesh);
-    SILT_TRY(p->plain ? silt_plane_factor(&p->plane, f, s, p->pinned, err) : factor_compact(p, f, s, err));
+    p->plain = f->dim == 2 && consistent;
+    p->rows = f->dim == 3 && consistent;
+    if (p->rows)
+        return silt_space_build(&p->space, f, s, p->pinned, stiff, err);
+    SILT_TRY(p->plain ? silt_plane_factor(&p->plane, f, s, p->pinned, err) : factor_laplacian(p, f, s, err));
     return stiff ? factor_stiff(p, f, s, err) : SILT_OK;
 }
 
@@ -225,71 +196,15 @@ static silt_status factor_solve(silt_system *system, const double *right, double
     return SILT_OK;
 }
 
-// out = (G^T P G / inertia + L) x, without assembling it
-static void operator_apply(silt_pressure *p, const silt_fluid *f, const silt_mesh *mesh, const double *x, double *out) {
-    const int D = f->dim;
-    memset(p->work, 0, (size_t)(D * p->n) * sizeof(double));
-    silt_assemble_pressure(f, mesh, x, p->work, NULL);
-    for (int i = 0; i < p->n; i++) {
-        silt_hold_project(f, i, p->work + D * i);
-        for (int d = 0; d < D; d++)
-            p->work[D * i + d] /= f->inertia[i];
-    }
-    silt_assemble_divergence(f, mesh, p->work, x, out);
-    for (int i = 0; i < p->n; i++)
-        out[i] = mesh->wet[i] ? out[i] + p->extra[i] * x[i] : x[i];
-}
-
-static double dot(int n, const double *a, const double *b) {
-    double sum = 0;
-    for (int i = 0; i < n; i++)
-        sum += a[i] * b[i];
-    return sum;
-}
-
-#define CG_LIMIT 400
-
-silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const silt_step *s, const double *right, double tolerance,
-                                double *x, silt_error *err) {
-    const int n = p->n;
-    if (p->plain) {
-        silt_plane_solve(p->plane, right, x);
-        return SILT_OK;
-    }
-    if (s->scene->fluid.pressure != PRESSURE_CONSISTENT)
+silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const double *right, double tolerance, double *x, silt_error *err) {
+    if (p->rows)
+        return silt_space_solve(p->space, right, tolerance, x, &f->pressure_iterations, err);
+    if (!p->plain)
         return factor_solve(&p->main, right, x, err);
-    for (int k = 0; k < 4; k++)
-        SILT_RESERVE(p->cg[k], p->cg_capacity[k], n + 1);
-    SILT_RESERVE(p->work, p->work_capacity, f->dim * n + 1);
-    double *r = p->cg[0], *z = p->cg[1], *d = p->cg[2], *ad = p->cg[3];
-    memcpy(r, right, (size_t)n * sizeof *r);
-    memset(x, 0, (size_t)n * sizeof *x);
-    SILT_TRY(factor_solve(&p->main, r, z, err));
-    memcpy(d, z, (size_t)n * sizeof *d);
-    double rz = dot(n, r, z);
-    const double target = silt_square(tolerance) * rz;
-    for (int k = 0; rz > target && rz > 0; k++) {
-        if (k == CG_LIMIT)
-            return silt_fail(err, SILT_FAILED, "the pressure system did not converge in %d iterations (%d nodes)", CG_LIMIT, n);
-        SILT_CLOCKED(apply, operator_apply(p, f, s->mesh, d, ad));
-        const double curvature = dot(n, d, ad);
-        if (!(curvature > 0))
-            return silt_fail(err, SILT_FAILED, "the pressure operator is not positive definite (%d nodes)", n);
-        const double alpha = rz / curvature;
-        for (int i = 0; i < n; i++) {
-            x[i] += alpha * d[i];
-            r[i] -= alpha * ad[i];
-        }
-        SILT_TRY(factor_solve(&p->main, r, z, err));
-        const double fresh = dot(n, r, z), beta = fresh / rz;
-        for (int i = 0; i < n; i++)
-            d[i] = z[i] + beta * d[i];
-        rz = fresh;
-        f->pressure_iterations++;
-    }
+    silt_plane_solve(p->plane, right, x);
     return SILT_OK;
 }
 
 silt_status silt_pressure_solve_stiff(silt_pressure *p, const double *right, double *increment, silt_error *err) {
-    return factor_solve(&p->stiff, right, increment, err);
+    return p->rows ? silt_space_solve_stiff(p->space, right, increment, err) : factor_solve(&p->stiff, right, increment, err);
 }

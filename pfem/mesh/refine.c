@@ -1,4 +1,5 @@
 // the cloud's density: crowded nodes leave, stretched places get nodes
+#include "delaunay.h"
 #include "pfem.h"
 
 /* Lengths are held against h, the mean of the local sizes of both ends. Candidates are taken in the order of how far off they
@@ -35,6 +36,7 @@ void silt_memory_clear(silt_memory *memory) {
     free(memory->x);
     free(memory->group_start);
     free(memory->exchange);
+    silt_delaunay_free(&memory->kept);
     *memory = (silt_memory){0};
 }
 

@@ -318,64 +318,81 @@ static bool cell_is_dent(const silt_mesh *mesh, const int *cell, const double *c
     return false;
 }
 
-// Cells of the live nodes. Where x is periodic, nodes nearer to its ends than `margin` are put beyond the other end
-// too, and of the copies of a cell the one is kept in which its lowest node is no copy. Coordinates are whole parts of
-// the period then: both copies have the same numbers but for a whole shift, so that ties are broken alike in both.
-static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene,
-                               const uint8_t *dead, double margin, int (**cells)[4], int *n_cell, silt_error *err) {
-    const int n = nodes->count, dim = mesh->dim, n_corner = dim + 1;
+// The live nodes; where x is periodic, nodes nearer to its ends than `margin` are put beyond the other end too. Coordinates are
+// whole parts of the period then: both copies of a cell have the same numbers but for a whole shift, so that ties are broken alike.
+// @param live  out, owned by the caller, the points' nodes, *n_live that are no copies first  @return how many points
+static int cloud_points(const silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const uint8_t *dead,
+                        double margin, int **live, double **x, int *n_live) {
+    const int n = nodes->count, dim = mesh->dim;
     const double period = mesh->period[0], parts = 17592186044416.0, scale = period > 0 ? parts / period : 1; // 2^44
-    int m = 0, room = 0, x_room = 0, *live = NULL;
-    double *x = NULL;
-    SILT_RESERVE(live, room, n + 1);
-    SILT_RESERVE(x, x_room, dim * n + 1);
+    int m = 0, room = 0, x_room = 0;
+    SILT_RESERVE(*live, room, n + 1);
+    SILT_RESERVE(*x, x_room, dim * n + 1);
     for (int i = 0; i < n; i++)
         if (!dead || !dead[i]) {
-            live[m] = i;
+            (*live)[m] = i;
             for (int d = 0; d < dim; d++)
-                x[dim * m + d] = scale * nodes->x[dim * i + d];
+                (*x)[dim * m + d] = scale * nodes->x[dim * i + d];
             if (period > 0) {
                 const double at = floor((nodes->x[dim * i] - scene->period[0]) / period * parts + 0.5);
-                x[dim * m] = at - parts * floor(at / parts);
+                (*x)[dim * m] = at - parts * floor(at / parts);
             }
             m++;
         }
-    const int n_live = m;
-    for (int k = 0; period > 0 && k < n_live; k++)
+    *n_live = m;
+    for (int k = 0; period > 0 && k < *n_live; k++)
         for (int side = -1; side <= 1; side += 2) {
-            const double at = x[dim * k];
+            const double at = (*x)[dim * k];
             if (side > 0 ? at > margin * scale : at < parts - margin * scale)
                 continue;
-            SILT_RESERVE(live, room, m + 1);
-            SILT_RESERVE(x, x_room, dim * (m + 1));
-            live[m] = live[k];
-            memcpy(x + dim * m, x + dim * k, (size_t)dim * sizeof *x);
-            x[dim * m++] = at + side * parts;
+            SILT_RESERVE(*live, room, m + 1);
+            SILT_RESERVE(*x, x_room, dim * (m + 1));
+            (*live)[m] = (*live)[k];
+            memcpy(*x + dim * m, *x + dim * k, (size_t)dim * sizeof **x);
+            (*x)[dim * m++] = at + side * parts;
         }
-    int *found = NULL, n_found = 0, kept = 0;
-    int failed;
-    SILT_CLOCKED(triangulate, failed = (dim == 3 ? silt_delaunay_3d : silt_delaunay_2d)(m, x, &found, &n_found));
-    *cells = NULL;
-    if (!failed)
-        *cells = silt_alloc((size_t)n_found + 1, sizeof **cells);
-    for (int e = 0; !failed && e < n_found; e++) {
-        const int *cell = found + n_corner * e;
-        int lowest = 0;
-        for (int a = 1; a < n_corner; a++)
-            if (live[cell[a]] < live[cell[lowest]])
-                lowest = a;
-        if (cell[lowest] >= n_live)
-            continue;
-        (*cells)[kept][3] = -1;
-        for (int a = 0; a < n_corner; a++)
-            (*cells)[kept][a] = live[cell[a]];
-        kept++;
+    return m;
+}
+
+// Cells of the live nodes, sorted. In the plane they follow from those of the rebuild before (memory: NULL, of none); of the
+// copies of a cell in a periodic cloud the one is kept in which its lowest node is no copy.
+static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene,
+                               silt_memory *memory, double margin, int (**cells)[4], int *n_cell, silt_error *err) {
+    const int dim = mesh->dim, n_corner = dim + 1;
+    const uint8_t *dead = memory ? memory->dead : NULL;
+    int *found = NULL, n_found = 0, kept = 0, failed;
+    if (memory && dim == 2 && mesh->period[0] <= 0) {
+        SILT_CLOCKED(triangulate,
+                     failed = silt_delaunay_follow(&memory->kept, nodes->count, nodes->x, dead, &found, &n_found));
+        kept = n_found;
+    } else {
+        int *live = NULL, n_live;
+        double *x = NULL;
+        const int m = cloud_points(mesh, nodes, scene, dead, margin, &live, &x, &n_live);
+        SILT_CLOCKED(triangulate, failed = (dim == 3 ? silt_delaunay_3d : silt_delaunay_2d)(m, x, &found, &n_found));
+        for (int e = 0; e < n_found; e++) {
+            const int *cell = found + n_corner * e;
+            int lowest = 0;
+            for (int a = 1; a < n_corner; a++)
+                if (live[cell[a]] < live[cell[lowest]])
+                    lowest = a;
+            if (cell[lowest] >= n_live)
+                continue;
+            for (int a = 0; a < n_corner; a++)
+                found[n_corner * kept + a] = live[cell[a]];
+            kept++;
+        }
+        free(live);
+        free(x);
     }
     *n_cell = kept;
+    *cells = NULL;
+    if (!failed) {
+        *cells = silt_alloc((size_t)kept + 1, sizeof **cells);
+        silt_cells_sort(nodes->count, n_corner, kept, found, *cells);
+    }
     free(found);
-    free(live);
-    free(x);
-    return failed ? silt_fail(err, SILT_FAILED, "no memory for the triangulation of %d nodes", m) : SILT_OK;
+    return failed ? silt_fail(err, SILT_FAILED, "no memory for the triangulation of %d nodes", nodes->count) : SILT_OK;
 }
 
 static void draft_push(silt_draft *draft, const int cell[4], int before, double quality) {
@@ -649,7 +666,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
     // copies beyond a periodic border must reach as far as the largest empty sphere of the water
     for (double margin = 3 * scene->fluid.alpha * h;; margin *= 2) {
         int(*cells)[4] = NULL, n_cells = 0;
-        const silt_status status = cloud_cells(mesh, nodes, scene, memory->dead, margin, &cells, &n_cells, err);
+        const silt_status status = cloud_cells(mesh, nodes, scene, memory, margin, &cells, &n_cells, err);
         if (status != SILT_OK) {
             silt_cell_set_clear(&old);
             free(sliver);
@@ -677,6 +694,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
     draft_clear(&draft);
 
     silt_nodes_compact(nodes, memory->dead, map);
+    silt_delaunay_renumber(memory->kept, map, nodes->count);
     for (int e = 0; e < mesh->n_cell; e++)
         for (int a = 0; a <= dim; a++)
             mesh->cell[e][a] = map[mesh->cell[e][a]];

@@ -38,6 +38,12 @@ void silt_cell_set_create(silt_cell_set *set, int n_node, int n, const int (*cel
 int silt_cell_set_find(const silt_cell_set *set, const int cell[4]); /**< index of the cell, or -1 */
 void silt_cell_set_clear(silt_cell_set *set);
 
+/** Cells by their lowest node, triangles also turned so that it is their first, and then by their second: the order hangs on the
+ * nodes' alone.
+ * @param node    n_corner each; turned too
+ * @param sorted  out, n; a triangle's fourth node is -1 */
+void silt_cells_sort(int n_node, int n_corner, int n, int *node, int (*sorted)[4]);
+
 /** a cell's measures */
 typedef struct silt_cell_shape {
     double volume; // m2 or m3

@@ -345,7 +345,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
             run->bed.fluid_node[k] = run->map[run->bed.fluid_node[k]];
     SILT_CLOCKED(refine, silt_size_update(run->size, nodes, mesh));
     SILT_TRY(silt_run_pockets(run, err));
-    silt_locator_build(&run->locator, mesh, nodes->x, h);
+    silt_run_locate(run);
     silt_clock_to(CLOCK_rest);
     return SILT_OK;
 }

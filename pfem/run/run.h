@@ -111,6 +111,7 @@ void silt_run_balance(silt_run *run);
 void silt_run_box(silt_run *run);
 silt_status silt_run_first(silt_run *run, silt_error *err);
 silt_status silt_run_pockets(silt_run *run, silt_error *err); // closed air of a fresh mesh
+void silt_run_locate(silt_run *run);                          // the locator of a fresh mesh, where bed or gauges ask it
 void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def);
 
 // move.c ----------------------------------------------------------------------------------------------

@@ -117,7 +117,7 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
         run->mesh.revision = revision;
         silt_size_create(&run->size, scene, &run->walls);
         silt_size_update(run->size, &run->nodes, &run->mesh);
-        silt_locator_build(&run->locator, &run->mesh, run->nodes.x, scene->fluid.size);
+        silt_run_locate(run);
     }
     silt_view view = {.scene = scene, .ledger = &run->ledger, .bed = scene->bed.on ? &run->bed : NULL};
     SILT_TRY(silt_gauges_create(&run->gauges, &view, err));

@@ -1,0 +1,348 @@
+// smoothed aggregation multigrid
+#include "coarse.h"
+#include "factor.h"
+
+#define COARSE_LEVELS 12
+#define COARSE_DIRECT 400  // rows that a factor takes
+#define COARSE_STRONG 0.25 // of the largest entry beside the diagonal: neighbours that are aggregated with each other
+#define COARSE_OMEGA  (4.0 / 3)
+
+/** a matrix, and how it follows from the next coarser one */
+typedef struct silt_level {
+    int n, n_coarse;
+    const int *start, *index;   // rows; borrowed on the finest level
+    int *own_start, *own_index; // owned
+    int *diagonal;              // owned, where it stands in the row
+    double *exact;              // owned, entries of a coarser level while the hierarchy is made
+    float *value, *inverse;     // owned, entries, 0 on the diagonal; 1/diagonal
+    int *to_start, *to;         // owned, rows of the prolongation
+    float *weight;              // owned
+    float *x, *right;           // owned
+    int start_capacity, index_capacity, diagonal_capacity, exact_capacity, value_capacity, inverse_capacity,
+        to_start_capacity, to_capacity, weight_capacity, x_capacity, right_capacity;
+} silt_level;
+
+struct silt_coarse {
+    int n_level;
+    silt_level level[COARSE_LEVELS];
+    silt_factor factor; // owned, of the coarsest level
+    double *work;       // owned, for its solution
+    int *group, *mark;  // owned, aggregates of the level at hand
+    double *strongest, *row;
+    int work_capacity, group_capacity, mark_capacity, strongest_capacity, row_capacity;
+};
+
+void silt_coarse_free(silt_coarse **coarse) {
+    if (!*coarse)
+        return;
+    silt_coarse *c = *coarse;
+    for (int l = 0; l < COARSE_LEVELS; l++) {
+        silt_level *a = &c->level[l];
+        free(a->own_start);
+        free(a->own_index);
+        free(a->diagonal);
+        free(a->exact);
+        free(a->value);
+        free(a->inverse);
+        free(a->to_start);
+        free(a->to);
+        free(a->weight);
+        free(a->x);
+        free(a->right);
+    }
+    silt_factor_clear(&c->factor);
+    free(c->work);
+    free(c->group);
+    free(c->mark);
+    free(c->strongest);
+    free(c->row);
+    free(c);
+    *coarse = NULL;
+}
+
+// single precision copies for the cycle. @return false where the diagonal is not positive
+static bool level_copy(silt_level *a, const double *value) {
+    const int filled = a->start[a->n];
+    SILT_RESERVE(a->value, a->value_capacity, filled + 1);
+    SILT_RESERVE(a->inverse, a->inverse_capacity, a->n + 1);
+    SILT_RESERVE(a->diagonal, a->diagonal_capacity, a->n + 1);
+    SILT_RESERVE(a->x, a->x_capacity, a->n + 1);
+    SILT_RESERVE(a->right, a->right_capacity, a->n + 1);
+    for (int k = 0; k < filled; k++)
+        a->value[k] = (float)value[k];
+    for (int i = 0; i < a->n; i++) {
+        int k = a->start[i];
+        while (a->index[k] != i)
+            k++;
+        a->diagonal[i] = k;
+        if (!(value[k] > 0) || !isfinite(value[k]))
+            return false;
+        a->inverse[i] = (float)(1 / value[k]);
+        a->value[k] = 0;
+    }
+    return true;
+}
+
+static bool strong(const silt_coarse *c, const double *value, int i, int j, int k) {
+    return i != j && -value[k] > 0 && -value[k] >= COARSE_STRONG * silt_min(c->strongest[i], c->strongest[j]);
+}
+
+// greedy: a node whose strong neighbours are all free takes them, then the rest joins its strongest neighbour that was
+// taken. Nodes without strong neighbours have no aggregate: the sweeps solve them. @return how many
+static int aggregate(silt_coarse *c, const silt_level *a, const double *value) {
+    int count = 0;
+    for (int i = 0; i < a->n; i++) {
+        c->strongest[i] = 0;
+        c->group[i] = -1;
+        for (int k = a->start[i]; k < a->start[i + 1]; k++)
+            if (a->index[k] != i)
+                c->strongest[i] = silt_max(c->strongest[i], -value[k]);
+    }
+    for (int i = 0; i < a->n; i++) {
+        bool free_ = c->group[i] < 0, any = false;
+        for (int k = a->start[i]; k < a->start[i + 1] && free_; k++)
+            if (strong(c, value, i, a->index[k], k)) {
+                any = true;
+                free_ = c->group[a->index[k]] < 0;
+            }
+        if (!free_ || !any)
+            continue;
+        for (int k = a->start[i]; k < a->start[i + 1]; k++)
+            if (strong(c, value, i, a->index[k], k))
+                c->group[a->index[k]] = count;
+        c->group[i] = count++;
+    }
+    memcpy(c->mark, c->group, (size_t)a->n * sizeof *c->mark);
+    for (int i = 0; i < a->n; i++) {
+        double most = 0;
+        for (int k = a->start[i]; k < a->start[i + 1] && c->mark[i] < 0; k++)
+            if (c->mark[a->index[k]] >= 0 && strong(c, value, i, a->index[k], k) && -value[k] > most) {
+                most = -value[k];
+                c->group[i] = c->mark[a->index[k]];
+            }
+    }
+    return count;
+}
+
+// Rows of the prolongation: the aggregates' indicator, smoothed by a step of Jacobi on the matrix whose weak entries
+// are lumped onto the diagonal
+static void prolongation(silt_coarse *c, silt_level *a, const double *value) {
+    SILT_RESERVE(a->to_start, a->to_start_capacity, a->n + 1);
+    for (int g = 0; g < a->n_coarse; g++)
+        c->mark[g] = -1;
+    int filled = 0;
+    for (int i = 0; i < a->n; i++) {
+        const int first = a->start[i], last = a->start[i + 1];
+        SILT_RESERVE(a->to, a->to_capacity, filled + last - first + 1);
+        SILT_RESERVE(a->weight, a->weight_capacity, filled + last - first + 1);
+        a->to_start[i] = filled;
+        double own = 0, others = 0;
+        for (int k = first; k < last; k++)
+            *(strong(c, value, i, a->index[k], k) ? &others : &own) += value[k];
+        const double step = own > 0 ? COARSE_OMEGA / (1 - others / own) : 0;
+        const int row = filled;
+        for (int k = first; k < last; k++) {
+            const int j = a->index[k], g = c->group[j];
+            const double w = j == i ? 1 - step : step > 0 && strong(c, value, i, j, k) ? -step * value[k] / own : 0;
+            if (g < 0 || w == 0 || c->group[i] < 0)
+                continue;
+            if (c->mark[g] < row) {
+                c->mark[g] = filled;
+                a->to[filled] = g;
+                a->weight[filled++] = 0;
+            }
+            a->weight[c->mark[g]] += (float)w;
+        }
+    }
+    a->to_start[a->n] = filled;
+}
+
+// rows of matrix times prolongation
+typedef struct product {
+    int *start, *index;
+    double *value;
+} product;
+
+static product multiply(silt_coarse *c, const silt_level *a, const double *value) {
+    int capacity = 0, value_capacity = 0, filled = 0;
+    product q = {silt_alloc((size_t)a->n + 1, sizeof *q.start), NULL, NULL};
+    for (int g = 0; g < a->n_coarse; g++)
+        c->mark[g] = -1;
+    for (int i = 0; i < a->n; i++) {
+        const int row = filled;
+        q.start[i] = row;
+        for (int k = a->start[i]; k < a->start[i + 1]; k++) {
+            const int j = a->index[k], more = a->to_start[j + 1] - a->to_start[j];
+            SILT_RESERVE(q.index, capacity, filled + more + 1);
+            SILT_RESERVE(q.value, value_capacity, filled + more + 1);
+            for (int m = a->to_start[j]; m < a->to_start[j + 1]; m++) {
+                const int g = a->to[m];
+                if (c->mark[g] < row) {
+                    c->mark[g] = filled;
+                    q.index[filled] = g;
+                    q.value[filled++] = 0;
+                }
+                q.value[c->mark[g]] += value[k] * a->weight[m];
+            }
+        }
+    }
+    q.start[a->n] = filled;
+    return q;
+}
+
+// the prolongation by columns: where each aggregate's entries stand, and in which row
+static void transpose(const silt_level *a, int *start, int *row, int *entry) {
+    for (int m = 0; m < a->to_start[a->n]; m++)
+        start[a->to[m] + 1]++;
+    for (int g = 0; g < a->n_coarse; g++)
+        start[g + 1] += start[g];
+    for (int i = a->n - 1; i >= 0; i--)
+        for (int m = a->to_start[i]; m < a->to_start[i + 1]; m++) {
+            const int at = --start[a->to[m] + 1];
+            row[at] = i;
+            entry[at] = m;
+        }
+    // start[g + 1] is now where g begins
+    memmove(start, start + 1, (size_t)a->n_coarse * sizeof *start);
+    start[a->n_coarse] = a->to_start[a->n];
+}
+
+// coarse matrix = prolongation^T matrix prolongation, columns rising
+static void galerkin(silt_coarse *c, const silt_level *a, const double *value, silt_level *b) {
+    const int filled_to = a->to_start[a->n];
+    product q = multiply(c, a, value);
+    int *start = silt_alloc((size_t)a->n_coarse + 2, sizeof *start),
+        *row = silt_alloc((size_t)filled_to + 1, sizeof *row),
+        *entry = silt_alloc((size_t)filled_to + 1, sizeof *entry);
+    transpose(a, start, row, entry);
+    b->n = a->n_coarse;
+    SILT_RESERVE(b->own_start, b->start_capacity, b->n + 1);
+    SILT_RESERVE(c->row, c->row_capacity, b->n + 1);
+    for (int g = 0; g < b->n; g++)
+        c->mark[g] = -1;
+    int filled = 0;
+    for (int g = 0; g < b->n; g++) {
+        const int first = filled;
+        b->own_start[g] = first;
+        for (int t = start[g]; t < start[g + 1]; t++) {
+            const int i = row[t];
+            SILT_RESERVE(b->own_index, b->index_capacity, filled + q.start[i + 1] - q.start[i] + 1);
+            for (int k = q.start[i]; k < q.start[i + 1]; k++) {
+                const int h = q.index[k];
+                if (c->mark[h] != g) {
+                    c->mark[h] = g;
+                    c->row[h] = 0;
+                    int at = filled++; // insertion: rows are short
+                    for (; at > first && b->own_index[at - 1] > h; at--)
+                        b->own_index[at] = b->own_index[at - 1];
+                    b->own_index[at] = h;
+                }
+                c->row[h] += a->weight[entry[t]] * q.value[k];
+            }
+        }
+        SILT_RESERVE(b->exact, b->exact_capacity, filled + 1);
+        for (int k = first; k < filled; k++)
+            b->exact[k] = c->row[b->own_index[k]];
+    }
+    b->own_start[b->n] = filled;
+    b->start = b->own_start;
+    b->index = b->own_index;
+    free(q.start);
+    free(q.index);
+    free(q.value);
+    free(start);
+    free(row);
+    free(entry);
+}
+
+static bool factor_coarsest(silt_coarse *c, const silt_level *a, const double *value) {
+    int filled = 0, at = 0;
+    for (int i = 0; i < a->n; i++)
+        filled += a->start[i + 1] - a->diagonal[i];
+    int *start = silt_factor_pattern(&c->factor, a->n, filled);
+    for (int i = 0; i < a->n; i++) {
+        start[i] = at;
+        for (int k = a->diagonal[i]; k < a->start[i + 1]; k++) {
+            c->factor.index[at] = a->index[k];
+            c->factor.value[at++] = value[k];
+        }
+    }
+    start[a->n] = at;
+    silt_factor_analyse(&c->factor, FACTOR_DEFINITE, NULL);
+    SILT_RESERVE(c->work, c->work_capacity, a->n + 1);
+    return silt_factor_compute(&c->factor);
+}
+
+bool silt_coarse_build(silt_coarse **coarse, int n, const int *start, const int *index, const double *value) {
+    if (!*coarse)
+        *coarse = silt_alloc(1, sizeof **coarse);
+    silt_coarse *c = *coarse;
+    SILT_RESERVE(c->group, c->group_capacity, n + 1);
+    SILT_RESERVE(c->mark, c->mark_capacity, n + 1);
+    SILT_RESERVE(c->strongest, c->strongest_capacity, n + 1);
+    c->level[0].n = n;
+    c->level[0].start = start;
+    c->level[0].index = index;
+    for (int l = 0;; l++) {
+        silt_level *a = &c->level[l];
+        const double *entry = l ? a->exact : value;
+        c->n_level = l + 1;
+        if (!level_copy(a, entry))
+            return false;
+        a->n_coarse = a->n > COARSE_DIRECT && c->n_level < COARSE_LEVELS ? aggregate(c, a, entry) : 0;
+        if (a->n_coarse == 0 || a->n_coarse > 0.7 * a->n)
+            return factor_coarsest(c, a, entry);
+        prolongation(c, a, entry);
+        galerkin(c, a, entry, a + 1);
+    }
+}
+
+// forward Gauss-Seidel from nought, and what it leaves, carried to the coarser level
+static void go_down(const silt_level *a, float *coarse) {
+    for (int i = 0; i < a->n; i++) {
+        float sum = a->right[i];
+        for (int k = a->start[i]; k < a->diagonal[i]; k++)
+            sum -= a->value[k] * a->x[a->index[k]];
+        a->x[i] = sum * a->inverse[i];
+    }
+    memset(coarse, 0, (size_t)a->n_coarse * sizeof *coarse);
+    for (int i = 0; i < a->n; i++) {
+        float left = 0;
+        for (int k = a->diagonal[i] + 1; k < a->start[i + 1]; k++)
+            left -= a->value[k] * a->x[a->index[k]];
+        for (int m = a->to_start[i]; m < a->to_start[i + 1]; m++)
+            coarse[a->to[m]] += a->weight[m] * left;
+    }
+}
+
+// the coarser level's correction, then backward Gauss-Seidel
+static void go_up(const silt_level *a, const float *coarse) {
+    for (int i = 0; i < a->n; i++)
+        for (int m = a->to_start[i]; m < a->to_start[i + 1]; m++)
+            a->x[i] += a->weight[m] * coarse[a->to[m]];
+    for (int i = a->n - 1; i >= 0; i--) {
+        float sum = a->right[i];
+        for (int k = a->start[i]; k < a->start[i + 1]; k++)
+            sum -= a->value[k] * a->x[a->index[k]];
+        a->x[i] = sum * a->inverse[i];
+    }
+}
+
+float *silt_coarse_right(silt_coarse *c) {
+    return c->level[0].right;
+}
+
+const float *silt_coarse_cycle(silt_coarse *c) {
+    silt_level *top = c->level, *last = &c->level[c->n_level - 1];
+    for (silt_level *a = top; a < last; a++)
+        go_down(a, a[1].right);
+    for (int i = 0; i < last->n; i++)
+        c->work[i] = last->right[i];
+    if (!silt_factor_solve(&c->factor, c->work, c->work))
+        return NULL;
+    for (int i = 0; i < last->n; i++)
+        last->x[i] = (float)c->work[i];
+    for (silt_level *a = last - 1; a >= top; a--)
+        go_up(a, a[1].x);
+    return top->x;
+}
