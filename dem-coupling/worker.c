@@ -143,9 +143,9 @@ static void *worker_grow(void *data, size_t count, size_t size) {
     return grown;
 }
 
-static double worker_seconds(void) {
+static double worker_seconds(clockid_t clock) {
     struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
+    clock_gettime(clock, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
@@ -442,9 +442,10 @@ static void worker_advance(int n_step) {
     }
     free(keep);
     if (n_step > 0) {
-        const double since = worker_seconds();
+        const double since = worker_seconds(CLOCK_MONOTONIC), cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID);
         script_run(worker.lmp, n_step);
-        worker.shared->seconds = worker_seconds() - since;
+        worker.shared->seconds = worker_seconds(CLOCK_MONOTONIC) - since;
+        worker.shared->cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID) - cpu;
     }
 }
 
@@ -452,7 +453,7 @@ static void worker_run(void) {
     dem_shared *s = worker.shared;
     const int *gone = DEM_SECTION(s, const int, remove);
 
-    s->seconds = 0;
+    s->seconds = s->cpu = 0;
     if (s->n_remove) {
         worker_atoms a = worker_look();
         worker_index(&a);
@@ -548,7 +549,7 @@ int main(int argc, char **argv) {
         worker_fail("memory file: %s", strerror(errno));
     worker_mpi();
 
-    for (;;) {
+    for (double told = 0;;) {
         char word = 0;
         ssize_t got = recv(DEM_FD_SOCKET, &word, 1, 0);
         if (got < 0 && errno == EINTR)
@@ -570,6 +571,9 @@ int main(int argc, char **argv) {
             worker_run();
         else if (word == DEM_SAVE)
             worker_save();
+        const double cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID);
+        worker.shared->cpu_all = cpu - told;
+        told = cpu;
         word = DEM_DONE;
         if (send(DEM_FD_SOCKET, &word, 1, MSG_NOSIGNAL) != 1)
             break;
