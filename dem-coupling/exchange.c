@@ -138,10 +138,25 @@ static void exchange_source(silt_exchange *e) {
     }
 }
 
+// true when the last update saw this velocity and pressure: what it found stands. The water's first iterate is what the
+// step began with, one update in five.
+static bool exchange_seen(silt_exchange *e, const double *velocity, const double *pressure) {
+    const size_t n = (size_t)e->n_node;
+    if (memcmp(e->seen, velocity, 2 * n * sizeof(double)) == 0 &&
+        memcmp(e->seen + 2 * n, pressure, n * sizeof(double)) == 0)
+        return true;
+    memcpy(e->seen, velocity, 2 * n * sizeof(double));
+    memcpy(e->seen + 2 * n, pressure, n * sizeof(double));
+    return false;
+}
+
 // silt_drag's update: coefficient, push and source for an iterate of the water's velocity and pressure. Two solves, of all
 // fields that can be made together, and one pass over the grains between them.
 static void exchange_update(void *self, const double *velocity, const double *pressure, double dt) {
     silt_exchange *e = self;
+    const bool seen = exchange_seen(e, velocity, pressure);
+    if (seen && dt == e->dt)
+        return;
     const bool renew = e->refresh || dt != e->dt;
     exchange_midpoint(e, velocity, dt);
     exchange_smooth(e, velocity, pressure);
@@ -243,6 +258,7 @@ silt_status silt_exchange_place(silt_exchange *e, const silt_nodes *nodes, const
     SILT_RESERVE(e->source, e->node_capacity[3], n);
     SILT_RESERVE(e->read, e->node_capacity[4], READ_FIELDS * n);
     SILT_RESERVE(e->give, e->node_capacity[5], GIVE_FIELDS * n);
+    SILT_RESERVE(e->seen, e->node_capacity[8], 3 * n);
     SILT_RESERVE(e->chosen, e->node_capacity[6], n);
     SILT_RESERVE(e->placed_x, e->node_capacity[7], 2 * n);
     exchange_choose(e);
@@ -327,6 +343,7 @@ void silt_exchange_clear(silt_exchange *e) {
     free(e->source);
     free(e->read);
     free(e->give);
+    free(e->seen);
     free(e->chosen);
     free(e->placed_x);
     free(e->bin);

@@ -67,7 +67,8 @@ typedef struct silt_exchange {
     bool placed;
     int64_t revision; // of the mesh then
     int n_placed_cell, *bin; // owned, grid around the grains
-    int node_capacity[8], cell_capacity[2], bin_capacity;
+    double *seen;            // owned, velocity and pressure of the last update
+    int node_capacity[9], cell_capacity[2], bin_capacity;
 } silt_exchange;
 
 /** F/(u - v) in kg/s of one grain of diameter d in water of solid fraction `solid`, at the relative speed w. Above a

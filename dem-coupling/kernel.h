@@ -18,7 +18,8 @@ typedef struct silt_kernel {
     double *area;             // owned, m2 per cell of the mesh, of those in near; so is gradient
     double (*gradient)[3][2]; // owned, 1/m, of the cell's three shape functions
     double *work;             // owned, of a solve
-    int work_capacity, node_capacity[3], cell_capacity[3];
+    int n_panel, *panel;      // owned, first columns of groups of columns of the factor
+    int work_capacity, panel_capacity, node_capacity[3], cell_capacity[3];
     struct silt_kernel_factor *factor; // owned
 } silt_kernel;
 
