@@ -2,7 +2,7 @@
 #include "exchange.h"
 
 static const double solid_most = 0.75; // densest packing that the drag formulas are asked about
-static const double kernel_reach = 6.0; // kernel widths; the kernel falls off with exp(-2 r/width)
+static const double kernel_reach = 8.0; // kernel widths; the kernel falls off with exp(-2 r/width)
 static const double flat_cell =
     0.05; // of its area: a cell flatter than this at the middle of the step counts as at its start
 
@@ -184,8 +184,8 @@ static void exchange_update(void *self, const double *velocity, const double *pr
 
 // ---------------------------------------------------------------- the step
 
-// Nodes within reach of a grain: what stands farther off hears e^-12 of it. Nothing of the exchange is done for the others (ten
-// thousand grains in a third of a tank: 45 % of the nodes, and a quarter of the time for the factor). The kernel closes
+// Nodes within reach of a grain: what stands farther off hears e^-16 of it. Nothing of the exchange is done for the others (ten
+// thousand grains in a third of a tank: half of the nodes, and a third of the time for the factor). The kernel closes
 // whatever the choice is.
 static void exchange_choose(silt_exchange *e) {
     const silt_mesh *mesh = e->mesh;
