@@ -350,7 +350,7 @@ static void worker_open(void) {
     if (s->resume) {
         worker_body_table();
         script_integrate(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
-        script_set_up(worker.lmp);
+        script_set_up(worker.lmp, s);
         worker_answer();
     }
     // from here on five lines a run would fill the disk: the screen, a known member of LIGGGHTS' object, becomes a
@@ -432,7 +432,7 @@ static void worker_advance(int n_step) {
         memset(a.v[i], 0, 3 * sizeof *row);
         memset(a.omega[i], 0, 3 * sizeof *row);
     }
-    script_set_up(worker.lmp);
+    script_set_up(worker.lmp, worker.shared);
     // atoms outside the box are gone now, others have moved up
     a = worker_look();
     for (int i = 0; i < a.n; i++) {
@@ -481,7 +481,7 @@ static void worker_run(void) {
 // a worker that starts from this file sets itself up once before it takes edits; so does this one, to stay its equal
 static void worker_save(void) {
     script_save(worker.lmp, worker_path(DEM_FD_RESTART));
-    script_set_up(worker.lmp);
+    script_set_up(worker.lmp, worker.shared);
 }
 
 // ---- life
