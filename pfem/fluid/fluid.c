@@ -498,10 +498,23 @@ static double swirl(const silt_fluid *f, const silt_step *s) {
     return most * s->dt;
 }
 
+// fluid.tolerance is a share of a node's volume in a step of the usual length: many short steps shall not gain more than a few long
+// ones, or still water starts to swirl. @return what to multiply it by
+static double strictness(const silt_fluid *f, const silt_step *s) {
+    const double h = s->scene->fluid.size;
+    double fastest = sqrt(h * silt_length(3, s->scene->gravity));
+    for (int i = 0; i < f->n_node; i++)
+        if (s->mesh->wet[i])
+            fastest = silt_max(fastest, silt_length(f->dim, s->nodes->v + f->dim * i));
+    const double least = silt_clamp(1e-12 / s->scene->fluid.tolerance, 0.01, 1); // rounding
+    return fastest > 0 && !f->last_try ? silt_clamp(s->dt * fastest / (0.5 * h), least, 1) : 1;
+}
+
 static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, silt_error *err) {
     const silt_fluid_def *def = &s->scene->fluid;
     const bool consistent = def->pressure == PRESSURE_CONSISTENT;
     const int D = f->dim;
+    const double strict = strictness(f, s);
     const bool direct = D == 2 && consistent && def->scheme == SCHEME_IMPLICIT; // momentum and continuity can be factored as one
     const size_t bytes = (size_t)D * (size_t)f->n_node * sizeof(double);
     double before = HUGE_VAL;
@@ -553,10 +566,10 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
         // on the way the momentum is solved no further than it is worth; the iterate that ends it is solved out
-        const double drop = def->scheme == SCHEME_IMPLICIT && f->iterations && before > 10 * def->tolerance ? 1e-3 : 0;
+        const double drop = def->scheme == SCHEME_IMPLICIT && f->iterations && before > 10 * strict * def->tolerance ? 1e-3 : 0;
         SILT_TRY(velocity_star(f, s, stiff > 0, drop, err));
         int worst_node = star_continuity(f, s, p);
-        if (stiff > 0 && drop > 0 && f->worst <= def->tolerance) {
+        if (stiff > 0 && drop > 0 && f->worst <= strict * def->tolerance) {
             SILT_TRY(silt_momentum_solve(f, s, f->force, 0, f->star, err));
             worst_node = star_continuity(f, s, p);
         }
@@ -564,7 +577,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         if (!isfinite(f->worst))
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
         const bool passed = def->scheme == SCHEME_IMPLICIT || stiff == 0 || f->iterations > 0;
-        const bool fine = passed && f->worst <= (first ? 0.1 : 1) * def->tolerance && (!first || swirl(f, s) <= def->tolerance);
+        const bool fine = passed && f->worst <= (first ? 0.1 : 1) * strict * def->tolerance && (!first || swirl(f, s) <= def->tolerance);
         // at the end of the iterations a small residual is accepted; a first pressure takes longer to meet its projection
         if (fine || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);

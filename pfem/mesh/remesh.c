@@ -301,6 +301,23 @@ static void mesh_prepare(silt_mesh *mesh, const silt_nodes *nodes, const silt_sc
     mesh->period[1] = mesh->period[2] = 0;
 }
 
+// A shallow dent of the surface, in 2-D, is no wedge of water on a wall: its node stays on the surface. Covered by a flat cell it would
+// count as one from within.
+static bool cell_is_dent(const silt_mesh *mesh, const int *cell, const double *corner) {
+    for (int a = 0; a < 3 && mesh->dim == 2; a++) {
+        const int b = (a + 1) % 3, c = (a + 2) % 3;
+        double u[2], w[2];
+        for (int d = 0; d < 2; d++) {
+            u[d] = corner[2 * b + d] - corner[2 * a + d];
+            w[d] = corner[2 * c + d] - corner[2 * a + d];
+        }
+        // flatter than 120 degrees
+        if (silt_dot(2, u, w) < -0.5 * silt_length(2, u) * silt_length(2, w))
+            return were_joined(mesh, cell[a], cell[b]) && were_joined(mesh, cell[a], cell[c]) && !were_joined(mesh, cell[b], cell[c]);
+    }
+    return false;
+}
+
 // Cells of the live nodes. Where x is periodic, nodes nearer to its ends than `margin` are put beyond the other end
 // too, and of the copies of a cell the one is kept in which its lowest node is no copy. Coordinates are whole parts of
 // the period then: both copies have the same numbers but for a whole shift, so that ties are broken alike in both.
@@ -573,7 +590,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
             continue;
         const double bound = scene->fluid.alpha * h;
         const bool round = shape.radius < bound;
-        const bool wedge = !round && wedge_cell(mesh, nodes, cell, corner, h);
+        const bool wedge = !round && wedge_cell(mesh, nodes, cell, corner, h) && !(before[e] < 0 && cell_is_dent(mesh, cell, corner));
         bool keep = inner || flat || wedge || round || (dim == 3 && enclosing_radius(corner) < bound);
         if (!keep)
             continue;
