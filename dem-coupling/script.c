@@ -241,8 +241,9 @@ static double script_skin(const dem_shared *s) {
 static double script_bin(const dem_shared *s, int n_sphere) {
     const double most = 8e6, per_bin = 2.3, per_pair = 2.0, per_visit = 1.0; // ns
     double reach = 2 * s->max_radius + script_skin(s), size[2] = {s->hi[0] - s->lo[0], s->hi[1] - s->lo[1]};
-    double best = 0, least = INFINITY;
-    for (double bin = reach / 2; best == 0 || bin < fmax(size[0], size[1]); bin *= 1.25) {
+    // LIGGGHTS refuses a bin a hundred times as wide as the box is somewhere
+    double best = 0, least = INFINITY, widest = 20 * fmin(s->period, fmin(size[0], size[1]));
+    for (double bin = reach / 2; best == 0 || bin < widest; bin *= 1.25) {
         double layers = fmax(1, floor(s->period / bin)), bins = (size[0] / bin + 1) * (size[1] / bin + 1) * layers;
         double across = 2 * ceil(reach / bin) + 1, packed = across * bin / (2 * s->max_radius);
         double cost = per_bin * bins + per_pair * n_sphere * fmin(packed * packed, n_sphere) / 2 +
