@@ -144,6 +144,7 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     checkpoint_rows_fill(&r, false, c);
     for (int i = 0; i < c->n_grain; i++) {
         c->grain[i].sent = true;
+        c->grain[i].near = -1;
         c->last[i] = c->grain[i].id;
     }
     for (int i = 0; i < c->frozen.count; i++)

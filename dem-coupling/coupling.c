@@ -165,7 +165,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def, sil
 static coupling_grain *coupling_append(silt_coupling *c, const double x[2], const double v[2], double radius) {
     SILT_RESERVE(c->grain, c->grain_capacity, c->n_grain + 1);
     coupling_grain *g = &c->grain[c->n_grain++];
-    *g = (coupling_grain){.id = c->next_id++, .x = {x[0], x[1]}, .v = {v[0], v[1]}, .radius = radius};
+    *g = (coupling_grain){.id = c->next_id++, .near = -1, .x = {x[0], x[1]}, .v = {v[0], v[1]}, .radius = radius};
     return g;
 }
 
@@ -311,35 +311,68 @@ static void coupling_bed_changed(silt_coupling *c, const silt_bed *bed) {
 
 // ---------------------------------------------------------------- exchange with the water
 
+// The water's cell that holds a grain: by a walk from where it was last (10k grains: 0.3 ms), in the locator when that leads
+// to the water's edge. Locator and walk agree: a point well inside a cell is in that one only.
+static int coupling_locate(silt_coupling *c, coupling_grain *g, const silt_nodes *nodes, const silt_mesh *mesh,
+                           bool *located, double *weight) {
+    int cell = -1;
+    if (g->near >= 0 && g->near < mesh->n_node && mesh->wet[g->near])
+        cell = silt_locate_from(mesh, nodes->x, g->x, mesh->node_cell[mesh->node_cell_start[g->near]], weight);
+    if (cell < 0) {
+        if (!*located)
+            silt_locator_build(&c->locator, mesh, nodes->x, c->scene->fluid.size);
+        *located = true;
+        cell = silt_locate(&c->locator, mesh, nodes->x, g->x, weight);
+    }
+    g->near = cell >= 0 ? mesh->cell[cell][0] : -1;
+    return cell;
+}
+
+// grains into the exchange; @return false: mesh and grains stand where they stood, and so do their cells
+static bool coupling_find(silt_coupling *c, const silt_nodes *nodes, const silt_mesh *mesh) {
+    silt_exchange *e = &c->exchange;
+    bool stands = e->n_grain == c->n_grain && silt_exchange_stands(e, nodes, mesh), located = false;
+    for (int i = 0; i < c->n_grain && stands; i++)
+        stands = memcmp(e->grain[i].x, c->grain[i].x, sizeof e->grain[i].x) == 0 && e->grain[i].solid == c->grain[i].solid;
+    SILT_RESERVE(e->grain, e->grain_capacity, c->n_grain);
+    e->n_grain = c->n_grain;
+    c->wet = false;
+    for (int i = 0; i < c->n_grain; i++) {
+        coupling_grain *g = &c->grain[i];
+        silt_exchange_grain *to = &e->grain[i];
+        memcpy(to->x, g->x, sizeof to->x);
+        memcpy(to->v, g->v, sizeof to->v);
+        memcpy(to->contact, g->contact, sizeof to->contact);
+        to->solid = g->solid;
+        to->mass = g->mass;
+        to->diameter = g->diameter;
+        to->number = g->number;
+        if (!stands)
+            to->cell = coupling_locate(c, g, nodes, mesh, &located, to->weight);
+        c->wet = c->wet || to->cell >= 0;
+    }
+    return !stands;
+}
+
 static silt_status coupling_prepare(silt_coupling *c, const silt_nodes *nodes, const silt_mesh *mesh, double dt,
                                     const silt_drag **drag, silt_error *err) {
-    silt_exchange *e = &c->exchange;
     *drag = NULL;
     coupling_compact(c);
     c->wet = false;
     c->n_loaded = c->n_grain;
     if (c->n_grain == 0 || nodes == NULL || mesh == NULL || mesh->n_cell == 0)
         return SILT_OK;
-    silt_locator_build(&c->locator, mesh, nodes->x, c->scene->fluid.size);
-    SILT_RESERVE(e->grain, e->grain_capacity, c->n_grain);
-    e->n_grain = c->n_grain;
-    for (int i = 0; i < c->n_grain; i++) {
-        const coupling_grain *g = &c->grain[i];
-        silt_exchange_grain *to = &e->grain[i];
-        *to = (silt_exchange_grain){.x = {g->x[0], g->x[1]},
-                                    .v = {g->v[0], g->v[1]},
-                                    .solid = g->solid,
-                                    .mass = g->mass,
-                                    .diameter = g->diameter,
-                                    .number = g->number,
-                                    .contact = {g->contact[0], g->contact[1]}};
-        to->cell = silt_locate(&c->locator, mesh, nodes->x, to->x, to->weight);
-        c->wet = c->wet || to->cell >= 0;
-    }
+    const bool moved = coupling_find(c, nodes, mesh);
+    if (moved)
+        c->exchange.placed = false;
     if (!c->wet)
         return SILT_OK;
-    SILT_TRY(silt_exchange_prepare(e, nodes, mesh, dt, err));
-    *drag = &e->drag;
+    // at the end of a step and at the start of the next the same is asked for: it is done once
+    if (!c->exchange.placed)
+        SILT_TRY(silt_exchange_place(&c->exchange, nodes, mesh, err));
+    if (dt > 0.0)
+        silt_exchange_begin(&c->exchange, nodes, dt);
+    *drag = &c->exchange.drag;
     return SILT_OK;
 }
 

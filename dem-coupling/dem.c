@@ -196,7 +196,9 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
         first += b->n_sphere;
     }
     SILT_TRY(dem_link_send(&dem->link, word, err));
-    return dem_link_collect(&dem->link, err);
+    SILT_TRY(dem_link_collect(&dem->link, err));
+    silt_clock_else(dem->link.shared->cpu_all);
+    return SILT_OK;
 }
 
 silt_status silt_dem_open(silt_dem **dem, const silt_dem_def *def, silt_error *err) {
@@ -552,7 +554,9 @@ silt_status silt_dem_wait(silt_dem *dem, silt_error *err) {
     // what was waited for are the substeps first, then what LIGGGHTS does around them
     const double since = silt_seconds();
     SILT_TRY(dem_link_collect(&dem->link, err));
-    silt_clock_book(CLOCK_grains, silt_min(silt_seconds() - since, dem->link.shared->seconds));
+    const dem_shared *s = dem->link.shared;
+    silt_clock_book(CLOCK_grains,
+                    silt_clock_else(s->cpu_all) ? s->cpu : silt_min(silt_seconds() - since, s->seconds));
     return dem_take(dem, err);
 }
 

@@ -58,17 +58,30 @@ typedef struct silt_exchange {
     const double *x;
     double dt;
     int n_node;
-    double *solid, *coefficient, *push, *source, *field; // owned, per node
+    double *solid, *coefficient, *push, *source; // owned, per node
+    double *read, *give;                         // owned, fields through the kernel, node by node
     double *area;                                        // owned, per cell, at the middle of the step
     double (*gradient)[3][2];                            // owned, per cell
-    int node_capacity[5], cell_capacity[2];
+    uint8_t *chosen;                             // owned, per node: the kernel holds it
+    double *placed_x;                            // owned, 2 per node, positions at the last place
+    bool placed;
+    int64_t revision; // of the mesh then
+    int n_placed_cell, *bin; // owned, grid around the grains
+    double *seen;            // owned, velocity and pressure of the last update
+    int node_capacity[9], cell_capacity[2], bin_capacity;
 } silt_exchange;
 
 /** F/(u - v) in kg/s of one grain of diameter d in water of solid fraction `solid`, at the relative speed w. Above a
  * solid fraction of 0.75 the formulas see 0.75. */
 double silt_drag_factor(silt_drag_law law, double density, double viscosity, double d, double solid, double w);
 
-/** Spreads the grains and makes the drag of a step dt from the nodes' velocity and pressure at its start, the grains'
+/** Spreads the grains over the water around them, their place in the mesh (cell, weight) given: the solid fraction. */
+silt_status silt_exchange_place(silt_exchange *exchange, const silt_nodes *nodes, const silt_mesh *mesh, silt_error *err);
+/** true when mesh and positions are those of the last place: only grains that moved make another one necessary */
+bool silt_exchange_stands(const silt_exchange *exchange, const silt_nodes *nodes, const silt_mesh *mesh);
+/** The drag of a step dt, after place: the second half of prepare. */
+void silt_exchange_begin(silt_exchange *exchange, const silt_nodes *nodes, double dt);
+/** place and begin. Spreads the grains and makes the drag of a step dt from the nodes' velocity and pressure at its start, the grains'
  * place in the mesh (cell, weight) given. Solid fraction and kernel stay as they are here until the next prepare;
  * nodes' positions must not change before load. The drag's update takes the velocity that the mesh moves with: pressure
  * gradient and source are those of the cells at x + dt/2 velocity, so that the force on the grains is, to rounding,

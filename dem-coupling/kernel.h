@@ -8,23 +8,28 @@
 
 #include "pfem.h"
 
+enum { KERNEL_FIELDS = 6 };
+
 typedef struct silt_kernel {
-    int n_node, n_cell;
-    double *volume;           // owned, m2 per node, a third of the cells around it; 0 for a node without a cell
-    double *area;             // owned, m2 per cell
-    double (*gradient)[3][2]; // owned, 1/m, per cell, of its three shape functions
-    int x_capacity, volume_capacity, cell_capacity, area_capacity;
-    int64_t revision; // of the mesh that the analysis belongs to
-    double width, *x; // what H was made for; x owned, 2 per node
-    bool ready;
+    int n_node, *node;        // owned, the mesh's nodes that the kernel holds, rising
+    int *local;               // owned, per node of the mesh: place in node, -1: none
+    int n_near, *near;        // owned, the mesh's cells that touch one of them, rising
+    double *volume;           // owned, m2 per node of the mesh, a third of the cells around it; 0 without a cell
+    double *area;             // owned, m2 per cell of the mesh, of those in near; so is gradient
+    double (*gradient)[3][2]; // owned, 1/m, of the cell's three shape functions
+    double *work;             // owned, of a solve
+    int n_panel, *panel;      // owned, first columns of groups of columns of the factor
+    int work_capacity, panel_capacity, node_capacity[3], cell_capacity[3];
     struct silt_kernel_factor *factor; // owned
 } silt_kernel;
 
-/** Factors H for the mesh at positions x (2 per node) and the kernel width in m. The symbolic part is redone only when
- * mesh->revision changed. Errors (SILT_FAILED): a cell without area, naming it. */
-silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const double *x, double width,
-                              silt_error *err);
-/** H^-1 applied in place to n_field (1 or 2) fields, stored one after the other with n_node values each */
+/** Factors H of the chosen nodes (1 in `chosen`, one per node of the mesh) for the mesh at positions x (2 per node) and
+ * the kernel width in m. M is that of all cells around a node, K that of the cells whose nodes are all chosen: nothing
+ * passes from the others, and H 1 = M 1 all the same. Errors (SILT_FAILED): a cell without area, naming it. */
+silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const double *x, const uint8_t *chosen,
+                              double width, silt_error *err);
+/** H^-1 applied in place to n_field fields, at most KERNEL_FIELDS, stored node by node of the mesh; the
+ * values at nodes that were not chosen stay */
 void silt_kernel_solve(silt_kernel *kernel, int n_field, double *field);
 void silt_kernel_clear(silt_kernel *kernel);
 

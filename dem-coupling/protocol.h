@@ -59,7 +59,8 @@ typedef struct dem_shared {
     int n_step;
     // answer
     int n_grain;
-    double seconds; // that the substeps took, without what stands before and after them
+    double seconds, cpu; // that the substeps took, on the wall and in CPU time, without what stands before and after them
+    double cpu_all;      // CPU time since the last answer
     char text[1024]; // why the worker gave up, or empty
     // sections, bytes from the start
     uint64_t wall;        // 4 double per wall

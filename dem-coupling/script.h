@@ -21,7 +21,7 @@ void script_delete(void *lmp);
 /** Adds shared's spheres through the scratch file. */
 void script_add(void *lmp, const dem_shared *shared, const char *file, int fd);
 /** neighbours, contact forces and applied forces anew; nothing moves, nothing is added to the contacts' history */
-void script_set_up(void *lmp);
+void script_set_up(void *lmp, const dem_shared *shared);
 /** n_step substeps, the first with the forces of the last set-up; every run has its own set-up before: impulses are
  * exact, and a restarted worker gives the same bits */
 void script_run(void *lmp, int n_step);

@@ -21,6 +21,7 @@ typedef struct coupling_grain {
     double contact[2], net;     // N/m, of the last step
     double old_x[2], old_v[2];  // before the substeps
     int contacts;
+    int near; // a node of the water next to it when it was last located, -1: none
     uint8_t on_bed;
     bool sent, gone; // LIGGGHTS has it; it was deposited or left
 } coupling_grain;

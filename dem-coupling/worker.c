@@ -143,9 +143,9 @@ static void *worker_grow(void *data, size_t count, size_t size) {
     return grown;
 }
 
-static double worker_seconds(void) {
+static double worker_seconds(clockid_t clock) {
     struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
+    clock_gettime(clock, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
@@ -350,7 +350,7 @@ static void worker_open(void) {
     if (s->resume) {
         worker_body_table();
         script_integrate(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
-        script_set_up(worker.lmp);
+        script_set_up(worker.lmp, s);
         worker_answer();
     }
     // from here on five lines a run would fill the disk: the screen, a known member of LIGGGHTS' object, becomes a
@@ -432,7 +432,7 @@ static void worker_advance(int n_step) {
         memset(a.v[i], 0, 3 * sizeof *row);
         memset(a.omega[i], 0, 3 * sizeof *row);
     }
-    script_set_up(worker.lmp);
+    script_set_up(worker.lmp, worker.shared);
     // atoms outside the box are gone now, others have moved up
     a = worker_look();
     for (int i = 0; i < a.n; i++) {
@@ -442,9 +442,10 @@ static void worker_advance(int n_step) {
     }
     free(keep);
     if (n_step > 0) {
-        const double since = worker_seconds();
+        const double since = worker_seconds(CLOCK_MONOTONIC), cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID);
         script_run(worker.lmp, n_step);
-        worker.shared->seconds = worker_seconds() - since;
+        worker.shared->seconds = worker_seconds(CLOCK_MONOTONIC) - since;
+        worker.shared->cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID) - cpu;
     }
 }
 
@@ -452,7 +453,7 @@ static void worker_run(void) {
     dem_shared *s = worker.shared;
     const int *gone = DEM_SECTION(s, const int, remove);
 
-    s->seconds = 0;
+    s->seconds = s->cpu = 0;
     if (s->n_remove) {
         worker_atoms a = worker_look();
         worker_index(&a);
@@ -480,7 +481,7 @@ static void worker_run(void) {
 // a worker that starts from this file sets itself up once before it takes edits; so does this one, to stay its equal
 static void worker_save(void) {
     script_save(worker.lmp, worker_path(DEM_FD_RESTART));
-    script_set_up(worker.lmp);
+    script_set_up(worker.lmp, worker.shared);
 }
 
 // ---- life
@@ -548,7 +549,7 @@ int main(int argc, char **argv) {
         worker_fail("memory file: %s", strerror(errno));
     worker_mpi();
 
-    for (;;) {
+    for (double told = 0;;) {
         char word = 0;
         ssize_t got = recv(DEM_FD_SOCKET, &word, 1, 0);
         if (got < 0 && errno == EINTR)
@@ -570,6 +571,9 @@ int main(int argc, char **argv) {
             worker_run();
         else if (word == DEM_SAVE)
             worker_save();
+        const double cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID);
+        worker.shared->cpu_all = cpu - told;
+        told = cpu;
         word = DEM_DONE;
         if (send(DEM_FD_SOCKET, &word, 1, MSG_NOSIGNAL) != 1)
             break;

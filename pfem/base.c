@@ -76,6 +76,7 @@ double silt_seconds(void) {
 
 static _Thread_local struct {
     double seconds[CLOCK_COUNT], since;
+    double other; // s, of processes that worked for this one while it waited
     silt_clock now;
     bool cpu;
 } clocks = {.now = CLOCK_rest};
@@ -85,7 +86,13 @@ double silt_clock_now(void) {
         return silt_seconds();
     struct timespec now;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+    return clocks.other + (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+bool silt_clock_else(double seconds) {
+    if (clocks.cpu)
+        clocks.other += seconds;
+    return clocks.cpu;
 }
 
 void silt_clock_cpu(bool cpu) {

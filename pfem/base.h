@@ -46,6 +46,8 @@ typedef enum silt_clock {
 } silt_clock;
 void silt_clock_cpu(bool cpu);                /**< this thread's clocks tick on the wall, or in the process' own CPU time */
 double silt_clock_now(void);                  /**< s, of that */
+/** CPU time of another process that this one waited for; @return true: the clocks tick in CPU time and have taken it */
+bool silt_clock_else(double seconds);
 void silt_clock_reset(void);                  /**< all at 0, `rest` runs */
 silt_clock silt_clock_to(silt_clock clock);   /**< from now on this one runs; @return the one that ran */
 void silt_clock_book(silt_clock clock, double seconds); /**< s of the clock that runs are this one's */

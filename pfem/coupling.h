@@ -36,7 +36,8 @@ typedef struct silt_coupling_type {
     silt_body_state *(*bodies)(const silt_coupling *coupling);        // count 0 when there are none
 
     /** Before the water's step: finds the grains in the mesh, spreads their volume, prepares the drag for a step dt.
-     * *drag is NULL when no grain is in the water. May be called again with another dt. */
+     * *drag is NULL when no grain is in the water. May be called again with another dt; with 0 only the volume is spread
+     * (drag->solid), the rest of the drag is not to be used. */
     silt_status (*prepare)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, double dt,
                            const silt_drag **drag, silt_error *err);
     /** After the water's step, before nodes move: forces on grains from the accepted pressure and the velocity that the drag

@@ -304,6 +304,9 @@ void silt_locator_build(silt_locator *locator, const silt_mesh *mesh, const doub
 /** Cell that holds the point, or -1; across a periodic border any image of the point will do.
  * @param weight  out, dim + 1 barycentric weights */
 int silt_locate(const silt_locator *locator, const silt_mesh *mesh, const double *x, const double *point, double *weight);
+/** The same by a walk from a cell near by, without a locator; 2-D, no periodic border.
+ * @return -1 when the walk meets the water's edge or the point lies on a facet: ask the locator */
+int silt_locate_from(const silt_mesh *mesh, const double *x, const double *point, int cell, double *weight);
 void silt_locator_clear(silt_locator *locator);
 
 // ---------------------------------------------------------------- what grains do to the water in a step

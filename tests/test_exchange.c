@@ -172,8 +172,7 @@ static void test_kernel_conserves(void **unused) {
         near(one[i], 1, 1e-12, "sum of a grain's weights");
     free(one);
 
-    // the same mesh moved a little keeps its analysis, a new one does not, one that did not move keeps all; all
-    // conserve
+    // moved a little, as another mesh, and where it stood: all conserve
     for (int round = 0; round < 3; round++) {
         for (int i = 0; i < t.mesh.n_node; i++)
             t.nodes.x[2 * i] *= round < 2 ? 1.01 : 1;
@@ -184,6 +183,49 @@ static void test_kernel_conserves(void **unused) {
             held += t.exchange.kernel.volume[i] * t.exchange.solid[i];
         near(held / spread, 1, 1e-12, "solid volume after moving");
     }
+    tank_close(&t);
+}
+
+// A long tank with grains at its end: the kernel holds the nodes near them only, and still conserves and closes. A uniform
+// velocity and a linear pressure are felt exactly: water = u, force of pressure = -V grad p.
+static void test_kernel_reaches_as_far_as_needed(void **unused) {
+    (void)unused;
+    tank t;
+    tank_open(&t, 160, 6, 0.01);
+    tank_fill(&t, 60, 0.3, 0.06);
+    silt_exchange *e = &t.exchange;
+    double *velocity = silt_alloc(2 * (size_t)t.mesh.n_node, sizeof *velocity);
+    double *pressure = silt_alloc((size_t)t.mesh.n_node, sizeof *pressure);
+    const double u[2] = {0.3, -0.2}, slope[2] = {70, -9810};
+    for (int i = 0; i < t.mesh.n_node; i++) {
+        memcpy(velocity + 2 * i, u, sizeof u);
+        pressure[i] = slope[0] * t.nodes.x[2 * i] + slope[1] * t.nodes.x[2 * i + 1];
+    }
+    memcpy(t.nodes.v, velocity, 2 * (size_t)t.mesh.n_node * sizeof *velocity);
+    memcpy(t.nodes.p, pressure, (size_t)t.mesh.n_node * sizeof *pressure);
+    OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, 1e-3, &error));
+    assert_in_range(e->kernel.n_node, t.mesh.n_node / 4, t.mesh.n_node * 3 / 4);
+    silt_exchange_load(e, velocity, pressure, 1e-3);
+    double spread = 0, held = 0, given[2] = {0, 0}, taken[2] = {0, 0};
+    for (int p = 0; p < e->n_grain; p++) {
+        const silt_exchange_grain *g = &e->grain[p];
+        for (int k = 0; k < 2 && g->cell >= 0; k++) {
+            near(g->water[k], u[k], 1e-12, "uniform velocity at a grain");
+            near(g->pressure[k] / (g->solid * slope[1]), -slope[k] / slope[1], 1e-10, "linear pressure at a grain");
+            taken[k] += g->force[k] - g->pressure[k];
+        }
+        spread += g->cell >= 0 ? g->solid : 0;
+    }
+    for (int i = 0; i < t.mesh.n_node; i++) {
+        held += e->kernel.volume[i] * e->solid[i];
+        for (int k = 0; k < 2; k++)
+            given[k] += e->push[2 * i + k] - e->coefficient[i] * u[k];
+    }
+    near(held / spread, 1, 1e-12, "solid volume");
+    for (int k = 0; k < 2; k++)
+        near((given[k] + taken[k]) / e->totals.size, 0, 1e-13, "drag on the water and on the grains");
+    free(velocity);
+    free(pressure);
     tank_close(&t);
 }
 
@@ -988,6 +1030,7 @@ static void test_body_on_the_bed(void **unused) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_kernel_conserves),
+        cmocka_unit_test(test_kernel_reaches_as_far_as_needed),
         cmocka_unit_test(test_kernel_against_elimination),
         cmocka_unit_test(test_kernel_refuses_a_flat_cell),
         cmocka_unit_test(test_what_grains_gain_the_water_loses),

@@ -276,6 +276,13 @@ static void test_locate(void **state) {
         assert_int_equal(e >= 0, inside);
         if (e < 0)
             continue;
+        // a walk from near by ends in the same cell with the same weights, one from afar may give up
+        double found[3] = {0};
+        const int start = b.mesh.node_cell[b.mesh.node_cell_start[b.mesh.cell[e][k % 3]]];
+        assert_int_equal(silt_locate_from(&b.mesh, b.nodes.x, p, start, found), e);
+        assert_memory_equal(found, w, sizeof w);
+        const int far = silt_locate_from(&b.mesh, b.nodes.x, p, 0, found);
+        assert_true(far == e || far == -1);
         for (int d = 0; d < 2; d++) {
             double x = 0;
             for (int a = 0; a < 3; a++)

@@ -168,6 +168,25 @@ int silt_locate(const silt_locator *locator, const silt_mesh *mesh, const double
     return best;
 }
 
+int silt_locate_from(const silt_mesh *mesh, const double *x, const double *point, int cell, double *weight) {
+    const int most = 32;
+    if (mesh->dim == 3 || mesh->period[0] > 0 || mesh->period[1] > 0)
+        return -1;
+    for (int n = 0; n < most && cell >= 0; n++) {
+        double corner[12], w[4];
+        silt_cell_corners(mesh, x, mesh->cell[cell], corner);
+        if (!weights_2d(corner, point, w))
+            return -1;
+        const int least = w[0] < w[1] ? (w[0] < w[2] ? 0 : 2) : (w[1] < w[2] ? 1 : 2);
+        if (w[least] > 1e-12) {
+            memcpy(weight, w, 3 * sizeof *w);
+            return cell;
+        }
+        cell = mesh->across[cell][least];
+    }
+    return -1;
+}
+
 void silt_locator_clear(silt_locator *locator) {
     free(locator->start);
     free(locator->item);

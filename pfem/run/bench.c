@@ -228,7 +228,7 @@ static silt_status row_measure(const silt_bench_def *def, const char *folder, be
                               : silt_scene_read(row->name, def->n_set, def->set, &scene, err);
     if (status == SILT_OK) {
         // on one thread what counts is the processor's time: a busy machine adds none to it
-        row->cpu = row->threads == 1 && !silt_scene_has_dem(scene);
+        row->cpu = row->threads == 1;
         silt_clock_cpu(row->cpu);
         const double before = memory_line("VmRSS"), started = silt_clock_now();
         row->dimension = scene->dimension;

@@ -442,7 +442,7 @@ static silt_status step_close(silt_run *run, silt_error *err) {
     silt_status status = SILT_OK;
     if (run->coupling && run->scene->fluid.on)
         SILT_CLOCKED(coupling,
-                     status = silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
+                     status = silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, 0, &run->drag, err));
     SILT_TRY(status);
     silt_run_ledger(run);
     if (run->scene->fluid.on)

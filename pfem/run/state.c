@@ -126,6 +126,6 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
         SILT_TRY(silt_pockets_restore(&run->pockets, &run->mesh, store, err));
     // porosity of the state that was saved
     if (run->coupling && scene->fluid.on)
-        SILT_TRY(silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err));
+        SILT_TRY(silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, 0, &run->drag, err));
     return SILT_OK;
 }

@@ -28,6 +28,10 @@ static void write_number(FILE *to, double x) {
         fprintf(to, x > 0 ? ".inf" : "-.inf");
         return;
     }
+    if (fabs(x) < 1e9 && x == (int)x && !(x == 0 && signbit(x))) {
+        fprintf(to, "%d", (int)x);
+        return;
+    }
     // the fewest digits that read back to the same bits
     char text[32];
     for (int digits = 15; digits <= 17; digits++) {
@@ -126,6 +130,7 @@ static bool write_counts(const silt_key_table *table, const silt_key *key, const
 typedef struct write_state {
     FILE *to;
     int dimension;
+    bool files_only;         // numbers are left out: only the names of files are wanted
     bool folders;            // files with their folder, or their last part only
     const char *const *name; // or the k-th file as name[k]; NULL: not
     int n_file, capacity;
@@ -144,6 +149,11 @@ static void write_value(write_state *state, const silt_key *key, const void *bas
     const int dimension = state->dimension;
     const void *at = (const char *)base + key->offset;
     int number = 0;
+    // numbers are most of the work in a scene with many grains
+    const bool file = key->kind == KEY_FILE || key->kind == KEY_SURFACE || key->kind == KEY_SERIES || key->kind == KEY_TABLE ||
+                      key->kind == KEY_CURVE;
+    if (state->files_only && !file)
+        return;
     switch (key->kind) {
     case KEY_NUMBER:
         write_number(to, *(const double *)at);
@@ -259,7 +269,7 @@ char *silt_scene_text(const silt_scene *scene, bool folders) {
 }
 
 int silt_scene_files(const silt_scene *scene, const char ***file) {
-    write_state state = {.folders = true};
+    write_state state = {.folders = true, .files_only = true};
     free(write_scene(scene, &state));
     *file = state.file;
     return state.n_file;
