@@ -7,6 +7,7 @@
 
 #include "delaunay.h"
 #include "pocket.h"
+#include "scene_text.h"
 
 #define NEAR(value, expected, tolerance)                                                                                 \
     do {                                                                                                                 \
@@ -325,16 +326,8 @@ static void test_checkpoint(void **state) {
 
 // ---- air that walls shut in
 
-static silt_scene *scene_of(const char *text) {
-    char path[] = "/tmp/silt-pocket-XXXXXX";
-    const int fd = mkstemp(path);
-    assert_true(fd >= 0 && write(fd, text, strlen(text)) == (ssize_t)strlen(text));
-    close(fd);
-    silt_scene *scene = NULL;
-    silt_error err = {0};
-    if (silt_scene_read(path, 0, NULL, &scene, &err) != SILT_OK)
-        fail_msg("%s", err.text);
-    unlink(path);
+static silt_scene *scene_with_air(const char *text) {
+    silt_scene *scene = scene_of(text);
     scene->fluid.air_pressure = AIR;
     scene->fluid.air_exponent = 1.4;
     return scene;
@@ -345,7 +338,7 @@ static silt_scene *scene_of(const char *text) {
 #define FINE "fluid:\n  density: 1000\n  viscosity: 0\n  size: 0.025\n  jitter: 0.2\n"
 
 static void tank(const char *text, int expected, double volume) {
-    silt_scene *scene = scene_of(text);
+    silt_scene *scene = scene_with_air(text);
     bench b = {.scene = *scene};
     silt_walls walls = {0};
     silt_walls_create(&walls, scene, NULL);

@@ -34,7 +34,23 @@ static const int *pieces(silt_fluid *f, const silt_mesh *mesh) {
             }
         }
     }
+    SILT_RESERVE(f->closed, f->closed_capacity, f->n_node + 1);
+    memset(f->closed, 0, (size_t)f->n_node);
+    for (int i = 0; i < f->n_node; i++)
+        if (mesh->wet[i])
+            f->closed[f->piece[i]] = 1;
+    for (int i = 0; i < f->n_node; i++)
+        if (mesh->surface[i])
+            f->closed[f->piece[i]] = 0;
+    for (int k = 0; k < mesh->n_facet; k++)
+        if (mesh->facet_kind[k] == FACET_OPEN)
+            f->closed[f->piece[mesh->facet[k][0]]] = 0;
     return f->piece;
+}
+
+const uint8_t *silt_closed_pieces(silt_fluid *f, const silt_mesh *mesh) {
+    pieces(f, mesh);
+    return f->closed;
 }
 
 // a piece of water without free surface or opening with a level can neither grow nor shrink: there debts only move

@@ -21,6 +21,7 @@ void silt_fluid_clear(silt_fluid *f) {
         free(owned[k]);
     free(f->piece);
     free(f->walk);
+    free(f->closed);
     free(f->hold);
     free(f->mobile);
     silt_pressure_free(&f->pressure);

@@ -62,8 +62,9 @@ typedef struct silt_fluid {
     double *cg[3];        // owned, dim per node, momentum solver
     double *pressure_new, *v_start; // owned, 1 and dim per node: kept apart until the step is accepted
     int *piece, *walk;    // owned, per node: lowest node of its piece of water; working space
+    uint8_t *closed;      // owned, see silt_closed_pieces
     int64_t piece_revision; // of the mesh that these pieces belong to
-    int piece_capacity, walk_capacity;
+    int piece_capacity, walk_capacity, closed_capacity;
     double mu_max;        // Pa s, largest of mu
     bool shaped;          // shapes and x_mid are of this step
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
@@ -165,6 +166,9 @@ silt_status silt_momentum_solve(silt_fluid *fluid, const silt_step *step, const 
                                 silt_error *err);
 
 // debt.c -------------------------------------------------------------------------------------------------
+/** Pieces of water without a free surface, or an opening with a level, know their pressure up to a constant: 1 at one node of each,
+ * where it is pinned. n_node numbers, of the fluid; found once for a mesh. */
+const uint8_t *silt_closed_pieces(silt_fluid *fluid, const silt_mesh *mesh);
 /** debts spread a little among neighbours, then ask for their volume back: fluid->rate */
 void silt_debts_ask(silt_fluid *fluid, const silt_step *step);
 /** where water is hemmed in, a debt cannot be paid: it waits. @return whether any was let off */
@@ -202,7 +206,7 @@ void silt_pressure_forget(silt_pressure *pressure);
 
 // stiff.c -------------------------------------------------------------------------------------------------
 /** Assembles and factors the momentum, or momentum and continuity, of the present geometry and viscosity, 2-D. Makes *stiff at first. */
-silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *fluid, const silt_step *step, bool pressure, silt_error *err);
+silt_status silt_stiff_factor(silt_stiff **stiff, silt_fluid *fluid, const silt_step *step, bool pressure, silt_error *err);
 /** whether there is such a factor of the present step */
 bool silt_stiff_ready(const silt_stiff *stiff, bool pressure);
 /** the step is over */

@@ -14,12 +14,9 @@ struct silt_pressure {
     silt_plane *plane;         // owned, S + L in 2-D
     silt_space *space;         // owned, S + L in 3-D
     bool in_plane, in_space;   // it is that
-    int64_t pinned_revision;   // of the mesh that `pinned` belongs to
     int n;
-    uint8_t *pinned;        // owned, one per node: the pressure level of a closed piece of water
     double *row;            // owned
-    int *group;             // owned, per node
-    int pinned_capacity, row_capacity, group_capacity;
+    int row_capacity;
 };
 
 silt_pressure *silt_pressure_create(void) { return silt_alloc(1, sizeof(silt_pressure)); }
@@ -30,7 +27,7 @@ void silt_pressure_forget(silt_pressure *pressure) {
     silt_factor_clear(&pressure->main.factor);
     silt_factor_clear(&pressure->stiff.factor);
     silt_plane_forget(pressure->plane);
-    pressure->main.revision = pressure->stiff.revision = pressure->pinned_revision = -1;
+    pressure->main.revision = pressure->stiff.revision = -1;
 }
 
 void silt_pressure_free(silt_pressure **pressure) {
@@ -40,34 +37,9 @@ void silt_pressure_free(silt_pressure **pressure) {
     silt_pressure_forget(p);
     silt_plane_free(&p->plane);
     silt_space_free(&p->space);
-    free(p->pinned);
     free(p->row);
-    free(p->group);
     free(p);
     *pressure = NULL;
-}
-
-// pieces of water without a free surface, or an opening with a level, know their pressure up to a constant: one node each is pinned
-static void pin_closed(silt_pressure *p, const silt_mesh *mesh) {
-    SILT_RESERVE(p->pinned, p->pinned_capacity, mesh->n_node + 1);
-    SILT_RESERVE(p->group, p->group_capacity, mesh->n_node + 1);
-    int *parent = p->group;
-    for (int i = 0; i < mesh->n_node; i++) {
-        parent[i] = i;
-        p->pinned[i] = 0;
-    }
-    for (int e = 0; e < mesh->n_cell; e++)
-        silt_group_join(parent, mesh->cell[e]);
-    for (int i = 0; i < mesh->n_node; i++)
-        if (mesh->wet[i])
-            p->pinned[silt_group_find(parent, i)] = 1;
-    for (int i = 0; i < mesh->n_node; i++)
-        if (mesh->surface[i])
-            p->pinned[silt_group_find(parent, i)] = 0;
-    for (int k = 0; k < mesh->n_facet; k++)
-        if (mesh->facet_kind[k] == FACET_OPEN)
-            p->pinned[silt_group_find(parent, mesh->facet[k][0])] = 0;
-    p->pinned_revision = mesh->revision;
 }
 
 // lower triangle of the compact matrix, by columns
@@ -125,7 +97,7 @@ static silt_status system_factor(silt_system *system, const silt_step *s, bool f
 // (3/4: a gradient field meets 4/3 mu of the deviatoric stress)
 silt_status silt_pressure_factor_stiff(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     if (p->in_space)
-        return silt_space_build(&p->space, f, s, p->pinned, true, err);
+        return silt_space_build(&p->space, f, s, silt_closed_pieces(f, s->mesh), true, err);
     const silt_mesh *mesh = s->mesh;
     silt_system *system = &p->stiff;
     const bool fresh = system->revision != mesh->revision || !system->factor.inside;
@@ -153,6 +125,7 @@ silt_status silt_pressure_factor_stiff(silt_pressure *p, silt_fluid *f, const si
 
 static silt_status factor_laplacian(silt_pressure *p, silt_fluid *f, const silt_step *s, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
+    const uint8_t *pinned = silt_closed_pieces(f, mesh);
     silt_system *system = &p->main;
     const bool fresh = system->revision != mesh->revision || !system->factor.inside;
     if (fresh)
@@ -166,7 +139,7 @@ static silt_status factor_laplacian(silt_pressure *p, silt_fluid *f, const silt_
         double *diagonal = &value[start[j]];
         for (int k = start[j]; k < start[j + 1]; k++)
             value[k] = p->row[index[k]];
-        *diagonal = mesh->wet[j] ? *diagonal + silt_pressure_pin(mesh, p->pinned, j, *diagonal) : 1;
+        *diagonal = mesh->wet[j] ? *diagonal + silt_pressure_pin(mesh, pinned, j, *diagonal) : 1;
         if (mesh->surface[j]) // pressure increment prescribed on the free surface
             *diagonal += 1e12 * fabs(*diagonal);
         // clear what this column touched
@@ -182,11 +155,9 @@ silt_status silt_pressure_factor(silt_pressure *p, silt_fluid *f, const silt_ste
     p->in_plane = f->dim == 2 && consistent;
     p->in_space = f->dim == 3 && consistent;
     p->n = s->mesh->n_node;
-    if (!p->pinned || p->pinned_revision != s->mesh->revision)
-        pin_closed(p, s->mesh);
     if (p->in_space)
-        return silt_space_build(&p->space, f, s, p->pinned, false, err);
-    return p->in_plane ? silt_plane_factor(&p->plane, f, s, p->pinned, err) : factor_laplacian(p, f, s, err);
+        return silt_space_build(&p->space, f, s, silt_closed_pieces(f, s->mesh), false, err);
+    return p->in_plane ? silt_plane_factor(&p->plane, f, s, silt_closed_pieces(f, s->mesh), err) : factor_laplacian(p, f, s, err);
 }
 
 static silt_status factor_solve(silt_system *system, const double *right, double *out, silt_error *err) {

@@ -18,8 +18,7 @@ struct silt_stiff {
     int n;
     double *entry;                // owned, (dim + 1)^2 per neighbour
     double *right;                // owned, dim + 1 per node
-    int *closed;                  // owned, per node, group of joined water; then 1: its pressure is pinned
-    int entry_capacity, right_capacity, closed_capacity;
+    int entry_capacity, right_capacity;
 };
 
 void silt_stiff_end(silt_stiff *stiff) {
@@ -43,7 +42,6 @@ void silt_stiff_free(silt_stiff **stiff) {
     silt_stiff_forget(q);
     free(q->entry);
     free(q->right);
-    free(q->closed);
     free(q);
     *stiff = NULL;
 }
@@ -98,25 +96,6 @@ static int *node_order(const silt_mesh *mesh) {
     return order;
 }
 
-// pieces of water without a free surface know their pressure up to a constant
-static void find_closed(silt_stiff *q, const silt_mesh *mesh) {
-    const int n = mesh->n_node;
-    SILT_RESERVE(q->closed, q->closed_capacity, 2 * n + 2);
-    int *parent = q->closed + n + 1;
-    for (int i = 0; i < n; i++) {
-        parent[i] = i;
-        q->closed[i] = 0;
-    }
-    for (int e = 0; e < mesh->n_cell; e++)
-        silt_group_join(parent, mesh->cell[e]);
-    for (int i = 0; i < n; i++)
-        if (mesh->wet[i])
-            q->closed[silt_group_find(parent, i)] = 1;
-    for (int i = 0; i < n; i++)
-        if (mesh->surface[i])
-            q->closed[silt_group_find(parent, i)] = 0;
-}
-
 // [K -G; -G^T -L] of every pair of neighbours, without inertia and without regard to what is held
 static void assemble(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh) {
     enum { D = 2, M = 3 };
@@ -141,7 +120,7 @@ static void assemble(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh) 
 }
 
 // inertia on the diagonal; held components taken out
-static void hold(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh) {
+static void hold(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh, const uint8_t *closed) {
     enum { D = 2, M = 3 };
     for (int i = 0; i < q->n; i++) {
         double own = 0;
@@ -153,7 +132,7 @@ static void hold(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh) {
                 for (int d = 0; d < D; d++)
                     out[M * d + d] += f->inertia[i];
                 // a crumb between held nodes knows its pressure up to a constant too
-                out[M * D + D] *= q->closed[i] ? 2 : 1 + 1e-9;
+                out[M * D + D] *= closed[i] ? 2 : 1 + 1e-9;
                 if (!mesh->wet[i] || !(out[M * D + D] < 0))
                     out[M * D + D] = -1;
             }
@@ -191,7 +170,7 @@ static void fill(const silt_stiff *q, silt_blocks *b, const silt_mesh *mesh) {
             }
 }
 
-silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const silt_step *s, bool pressure,
+silt_status silt_stiff_factor(silt_stiff **stiff, silt_fluid *f, const silt_step *s, bool pressure,
                               silt_error *err) {
     const silt_mesh *mesh = s->mesh;
     if (!*stiff) {
@@ -209,11 +188,10 @@ silt_status silt_stiff_factor(silt_stiff **stiff, const silt_fluid *f, const sil
         pattern(&q->velocity, mesh, 2, order);
         pattern(&q->saddle, mesh, 3, order);
         free(order);
-        find_closed(q, mesh);
         q->revision = mesh->revision;
     }
     assemble(q, f, mesh);
-    hold(q, f, mesh);
+    hold(q, f, mesh, silt_closed_pieces(f, mesh));
     fill(q, b, mesh);
     bool done;
     SILT_CLOCKED(factor, done = silt_factor_compute(&b->factor));
