@@ -1,6 +1,6 @@
 // the cloud's density: crowded nodes leave, stretched places get nodes
 #include "delaunay.h"
-#include "pfem.h"
+#include "remesh.h"
 
 /* Lengths are held against h, the mean of the local sizes of both ends. Candidates are taken in the order of how far off they
  * are, never of their numbers. A node leaves with its surroundings locked for the step; a node comes only where it has room,
@@ -335,7 +335,18 @@ static void refine_flat(refinement *r) {
             refine_remove(r, r->list[c].a);
 }
 
-// cells around the edge a-b; *closed: no boundary facet has the edge
+// A node that was put on a wall has pressed cells flat onto it, which the rebuild leaves out: an edge under them lies on the wall
+// now. As one from within it would get a node without walls, and with it a hole in the wall's facets.
+static bool refine_pressed(const refinement *r, const int *cell) {
+    double corner[12];
+    if (!r->walls)
+        return false;
+    silt_cell_corners(r->mesh, r->nodes->x, cell, corner);
+    const silt_cell_shape shape = silt_cell_measure(r->dim, corner);
+    return silt_cell_on_wall(r->mesh, r->nodes, cell, &shape, silt_cell_h(r->nodes, r->dim + 1, cell, r->h));
+}
+
+// cells around the edge a-b that are water still; *closed: no boundary facet has the edge
 static int refine_around(const refinement *r, int a, int b, int room, int *around, bool *closed) {
     int n = 0, n_other = 0, other[64];
     *closed = true;
@@ -344,7 +355,7 @@ static int refine_around(const refinement *r, int a, int b, int room, int *aroun
         bool has = false;
         for (int c = 0; c <= r->dim; c++)
             has |= cell[c] == b;
-        if (!has)
+        if (!has || refine_pressed(r, cell))
             continue;
         around[n++] = r->mesh->node_cell[k];
         for (int c = 0; c <= r->dim; c++) {
