@@ -431,6 +431,10 @@ static void coupling_add(silt_coupling *c) {
         silt_dem_add(c->dem, n, c->add);
 }
 
+static void coupling_keep(silt_coupling *c) {
+    silt_dem_keep(c->dem);
+}
+
 static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     if (c->refused.count > 0)
         return silt_fail(err, c->refused.status, "%s", c->refused.text);
@@ -712,6 +716,7 @@ const silt_coupling_type silt_coupling_dem = {
     .release = coupling_release,
     .deposit = coupling_deposit,
     .bed_changed = coupling_bed_changed,
+    .keep = coupling_keep,
     .start = coupling_start,
     .finish = coupling_finish,
     .left = coupling_left,

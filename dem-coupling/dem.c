@@ -13,6 +13,7 @@ struct silt_dem {
     silt_dem_def def; // strings and walls owned
     dem_link link;
     bool begun; // bodies are in the worker
+    bool keep;  // the next run may do without a set-up
     // spheres in the worker, rising id and tag
     int n_live, cap_live;
     struct dem_live {
@@ -524,6 +525,8 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         n_grain += dem->live[i].kind == DEM_GRAIN;
     dem_shared *s = dem->link.shared;
     s->n_step = n_step;
+    s->keep = dem->keep;
+    dem->keep = false;
     s->n_remove = dem->n_remove;
     s->n_add = dem->n_add + n_fixed;
     s->n_force = force ? dem->state.n_grain : 0;
@@ -544,6 +547,10 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         }
     }
     return dem_link_send(&dem->link, DEM_RUN, err);
+}
+
+void silt_dem_keep(silt_dem *dem) {
+    dem->keep = true;
 }
 
 silt_status silt_dem_wait(silt_dem *dem, silt_error *err) {

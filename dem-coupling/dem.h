@@ -75,10 +75,14 @@ silt_status silt_dem_add_body(silt_dem *dem, const silt_dem_body *body, silt_err
  * @param force   3 per grain in the order of the last state (grains added since: 0), N
  * @param body_force, body_torque  3 per body, N, N m (about the centroid)
  * With n_step = 0 the edits are done and the state is read back. Momentum: exactly force n_step step, whatever went
- * before. Every run sets LIGGGHTS up anew, which costs about four substeps and leaves the dashpots (not the springs) of
- * the contacts out of its first half substep: runs of 10 substeps and more lose less than 5 % of the damping. */
+ * before. A run sets LIGGGHTS up anew, which costs about ten substeps of grains that seldom touch and leaves the dashpots (not the
+ * springs) of the contacts out of its first half substep; see silt_dem_keep. */
 silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const double *body_force,
                            const double *body_torque, silt_error *err);
+/** The next run may go on from where the last one ended, with its neighbour lists and without a set-up. A run is set up all the
+ * same when there are edits or free bodies, and after a save or load. How the lists came about decides the order of sums: the
+ * same bits come again only when set-ups come at the same steps again. */
+void silt_dem_keep(silt_dem *dem);
 /** Waits for the worker. Errors: the worker died (signal or exit, its last log line), a sphere or body is no longer
  * finite. */
 silt_status silt_dem_wait(silt_dem *dem, silt_error *err);

@@ -57,6 +57,7 @@ typedef struct dem_shared {
     // lengths of the sections
     int n_wall, n_body, n_body_sphere, n_remove, n_add, n_force, max_grain;
     int n_step;
+    int keep; // 1: this run may go on from the last one's end
     // answer
     int n_grain;
     double seconds, cpu; // that the substeps took, on the wall and in CPU time, without what stands before and after them

@@ -57,6 +57,9 @@ typedef struct silt_coupling_type {
     void (*deposit)(silt_coupling *coupling, int grain);  // grain: index into grains(); becomes a frozen sphere, queued
     /** the bed's surface changed (bed->revision): the frozen spheres along it are brought up to date, queued */
     void (*bed_changed)(silt_coupling *coupling, const silt_bed *bed);
+    /** The next start need not set the discrete elements up anew. Such set-ups must come at the same steps whatever happens to the
+     * run, and at every step that begins from a checkpoint. */
+    void (*keep)(silt_coupling *coupling);
     /** Runs n substeps: start returns at once, finish waits and refreshes grains() and bodies(). */
     silt_status (*start)(silt_coupling *coupling, int n, silt_error *err);
     silt_status (*finish)(silt_coupling *coupling, silt_error *err);
