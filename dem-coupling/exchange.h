@@ -86,8 +86,10 @@ typedef struct silt_exchange {
     bool placed;
     int64_t revision; // of the mesh then
     int n_placed_cell, *bin; // owned, grid around the grains
-    double *seen;            // owned, velocity and pressure of the last update
-    int node_capacity[9], cell_capacity, bin_capacity, wet_capacity, group_capacity;
+    int n_look, *look;       // owned, nodes that an update looks at
+    double (*seen)[3];       // owned, velocity and pressure there in the last update
+    bool steady;             // that changed little: it stands for the rest of the step
+    int node_capacity[10], cell_capacity, bin_capacity, wet_capacity, group_capacity;
 } silt_exchange;
 
 /** Spreads the grains over the water around them, their place in the mesh (cell, weight) given: the solid fraction. */
