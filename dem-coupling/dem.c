@@ -170,6 +170,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->max_radius = def->max_radius;
     s->min_radius = def->min_radius;
     s->n_wall = def->n_wall;
+    s->no_contacts = def->no_contacts;
     s->n_body = bodies ? dem->n_free : 0;
     s->n_body_sphere = bodies ? dem->n_free_sphere : 0;
     s->n_remove = s->n_add = s->n_force = 0;

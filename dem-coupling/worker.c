@@ -144,6 +144,12 @@ static void *worker_grow(void *data, size_t count, size_t size) {
     return grown;
 }
 
+static int *worker_zeros(size_t count) {
+    int *data = worker_grow(NULL, count, sizeof *data);
+    memset(data, 0, count * sizeof *data);
+    return data;
+}
+
 static double worker_seconds(clockid_t clock) {
     struct timespec now;
     clock_gettime(clock, &now);
@@ -260,12 +266,11 @@ static void worker_answer_bodies(void) {
 static void worker_answer(void) {
     worker_atoms a = worker_look();
     dem_grain *grain = DEM_SECTION(worker.shared, dem_grain, grain);
-    int *contacts = worker_grow(NULL, (size_t)a.n, sizeof *contacts),
-        *on_bed = worker_grow(NULL, (size_t)a.n, sizeof *on_bed);
+    int *contacts = worker_zeros((size_t)a.n), *on_bed = worker_zeros((size_t)a.n);
 
     worker_check(&a, "after the run");
     worker_index(&a);
-    if (touch_count(a.n, a.x, a.radius, a.type, worker.shared, worker.plane, contacts, on_bed) != 0)
+    if (!worker.shared->no_contacts && touch_count(a.n, a.x, a.radius, a.type, worker.shared, worker.plane, contacts, on_bed) != 0)
         worker_fail("out of memory");
     // rising tags
     worker.order = worker_grow(worker.order, (size_t)a.n, sizeof *worker.order);
