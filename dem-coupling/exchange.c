@@ -3,7 +3,7 @@
 
 #include "vector.h"
 
-static const double kernel_reach = 8.0; // kernel widths; the kernel falls off with exp(-2 r/width)
+static const double kernel_reach = 6.0; // kernel widths; the kernel falls off with exp(-2 r/width)
 static const double drag_steady = 1e-3; // of the largest drag: an update that changes less is the step's last (10k grains: 2 of 5 spared)
 static const double flat_cell =
     0.05; // of its area: a cell flatter than this at the middle of the step counts as at its start
@@ -51,7 +51,7 @@ static void exchange_smooth(silt_exchange *e, const double *velocity, const doub
         read[m][READ_VELOCITY + 1] = e->kernel.volume[i] * velocity[2 * i + 1];
         read[m][READ_GRADIENT] = read[m][READ_GRADIENT + 1] = 0.0;
     }
-    memset(read[e->kernel.n_node], 0, sizeof *read);
+    memset(read[e->kernel.n_node], 0, sizeof *read); // of nodes that the kernel does not hold
     for (int m = 0; m < e->kernel.n_near; m++) {
         const exchange_cell *cell = &e->cell[m];
         double slope[2];
@@ -223,7 +223,7 @@ static void exchange_update(void *self, const double *velocity, const double *pr
 
 // ---------------------------------------------------------------- the step
 
-// Nodes within reach of a grain: what stands farther off hears e^-16 of it. Nothing of the exchange is done for the others (ten
+// Nodes within reach of a grain: what stands farther off hears e^-12 of it. Nothing of the exchange is done for the others (ten
 // thousand grains in a third of a tank: half of the nodes, and a third of the time for the factor). The kernel closes
 // whatever the choice is.
 static void exchange_choose(silt_exchange *e) {

@@ -83,8 +83,8 @@ void silt_kernel_solve(const silt_kernel *kernel, int n_field, double *field) {
 
 void silt_kernel_smooth(silt_kernel *kernel, double *field) {
     const int n = kernel->n_node;
-    SILT_RESERVE(kernel->work, kernel->work_capacity, SMOOTH_FIELDS * n + 1);
-    memset(kernel->work, 0, SMOOTH_FIELDS * (size_t)n * sizeof *field);
+    SILT_RESERVE(kernel->work, kernel->work_capacity, SMOOTH_FIELDS * (n + 1));
+    memset(kernel->work, 0, SMOOTH_FIELDS * ((size_t)n + 1) * sizeof *field);
     for (int k = 0; k < n; k++)
         kernel->work[SMOOTH_FIELDS * k] = field[kernel->node[k]];
     silt_kernel_solve(kernel, SMOOTH_FIELDS, kernel->work);

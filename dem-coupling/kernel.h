@@ -27,7 +27,8 @@ typedef struct silt_kernel {
  * passes from the others, and H 1 = M 1 all the same. Errors (SILT_FAILED): a cell without area, naming it. */
 silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const double *x, const uint8_t *chosen,
                               double width, silt_error *err);
-/** H^-1 applied in place to n_field fields, 4 or NESTED_FIELDS, stored node by node in the kernel's order */
+/** H^-1 applied in place to n_field fields, 4 or NESTED_FIELDS, stored node by node in the kernel's order, with a row of finite
+ * numbers behind the last */
 void silt_kernel_solve(const silt_kernel *kernel, int n_field, double *field);
 /** the same for one field, stored by the nodes of the mesh; the values at nodes that were not chosen stay */
 void silt_kernel_smooth(silt_kernel *kernel, double *field);

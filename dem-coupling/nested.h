@@ -19,7 +19,8 @@ void silt_nested_order(silt_nested **nested, const silt_mesh *mesh, const double
 /** The factor of  diagonal + sum over triangles of n nodes each, that couple the corners c+1 and c+2 of cell e by edge[e][c] and
  * have rows of sum nought. diagonal: per node of the mesh. @return -1, or a node where that is not positive definite */
 int silt_nested_factor(silt_nested *nested, const silt_mesh *mesh, const double *diagonal, const double (*edge)[3]);
-/** matrix^-1 applied in place to n_field fields (4 or NESTED_FIELDS) stored node by node in the order of elimination */
+/** matrix^-1 applied in place to n_field fields (4 or NESTED_FIELDS) stored node by node in the order of elimination, with a row of
+ * finite numbers behind the last */
 void silt_nested_solve(const silt_nested *nested, int n_field, double *field);
 void silt_nested_free(silt_nested **nested);
 

@@ -743,7 +743,7 @@ static void bench_init(bench *b, bool bed) {
                                  .hi = {1.5, 1.5}};
     if (!bed)
         return;
-    b->scene.bed = (silt_bed_def){.on = true, .density = 2650, .porosity = 0.4, .size = 0.1};
+    b->scene.bed = (silt_bed_def){.on = true, .deposition = true, .density = 2650, .porosity = 0.4, .size = 0.1};
     b->scene.grains.parcel = 0.08;
     b->bed.x = b->x;
     b->bed.n_node = 11;
