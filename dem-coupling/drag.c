@@ -10,19 +10,21 @@ static const double least_square = 1e-200; // of a speed whose logarithm is aske
 // the root that does not hang on the speed, Newton's factor and the logarithm of the porosity
 enum { NUMBER_REYNOLDS, NUMBER_STOKES, NUMBER_NEWTON, NUMBER_POROSITY };
 
-void silt_drag_numbers(silt_drag_law law, double density, double viscosity, double d, double number, double solid,
-                       double out[DRAG_NUMBERS]) {
-    const double porosity = 1.0 - silt_clamp(solid, 0.0, solid_most), area = number * M_PI * d * d / 8.0;
-    memset(out, 0, DRAG_NUMBERS * sizeof *out);
+VECTOR_CLONES void silt_drag_numbers(silt_drag_law law, double density, double viscosity, const double d[DRAG_GROUP],
+                                     const double number[DRAG_GROUP], const double solid[DRAG_GROUP],
+                                     double out[DRAG_NUMBERS][DRAG_GROUP]) {
+    const eight width = *(const eight *)d, count = *(const eight *)number, share = *(const eight *)solid;
+    const eight porosity = eight_most(1.0 - eight_most(share, 0.0), 1.0 - solid_most), area = count * M_PI * width * width / 8.0;
+    eight *to = (eight *)out;
     if (law == DRAG_SCHILLER_NAUMANN) {
-        out[NUMBER_REYNOLDS] = density * d / viscosity;
-        out[NUMBER_STOKES] = number * 3.0 * M_PI * viscosity * d;
-        out[NUMBER_NEWTON] = 0.44 * area * density;
-    } else if (law == DRAG_DI_FELICE) {
-        out[NUMBER_REYNOLDS] = porosity * density * d / viscosity;
-        out[NUMBER_STOKES] = 4.8 * sqrt(viscosity / (porosity * density * d));
-        out[NUMBER_NEWTON] = area * density;
-        out[NUMBER_POROSITY] = log(porosity);
+        to[NUMBER_REYNOLDS] = density * width / viscosity;
+        to[NUMBER_STOKES] = count * 3.0 * M_PI * viscosity * width;
+        to[NUMBER_NEWTON] = 0.44 * area * density;
+    } else {
+        to[NUMBER_REYNOLDS] = porosity * density * width / viscosity;
+        to[NUMBER_STOKES] = 4.8 * eight_root(viscosity / (porosity * density * width));
+        to[NUMBER_NEWTON] = area * density;
+        to[NUMBER_POROSITY] = eight_log(porosity);
     }
 }
 
@@ -56,13 +58,15 @@ VECTOR_CLONES void silt_drag_group(silt_drag_law law, const double numbers[DRAG_
 }
 
 double silt_drag_factor(silt_drag_law law, double density, double viscosity, double d, double solid, double w) {
-    double one[DRAG_NUMBERS], numbers[DRAG_NUMBERS][DRAG_GROUP], square[DRAG_GROUP], factor[DRAG_GROUP];
-    silt_drag_numbers(law, density, viscosity, d, 1.0, solid, one);
+    double width[DRAG_GROUP], number[DRAG_GROUP], share[DRAG_GROUP], square[DRAG_GROUP], factor[DRAG_GROUP];
+    double numbers[DRAG_NUMBERS][DRAG_GROUP] = {{0.0}};
     for (int k = 0; k < DRAG_GROUP; k++) {
+        width[k] = d;
+        number[k] = 1.0;
+        share[k] = solid;
         square[k] = w * w;
-        for (int m = 0; m < DRAG_NUMBERS; m++)
-            numbers[m][k] = one[m];
     }
-    silt_drag_group(law, numbers, square, factor);
+    silt_drag_numbers(law, density, viscosity, width, number, share, numbers);
+    silt_drag_group(law, (const double(*)[DRAG_GROUP])numbers, square, factor);
     return factor[0];
 }

@@ -67,7 +67,7 @@ static void exchange_smooth(silt_exchange *e, const double *velocity, const doub
 
 // ---------------------------------------------------------------- parts of a step
 
-// what does not change within a step, of eight grains in the water at a time
+// what does not change within a step, of grains in the water in groups of eight
 static void exchange_pack(silt_exchange *e, double dt) {
     SILT_RESERVE(e->wet, e->wet_capacity, e->n_grain + DRAG_GROUP);
     SILT_RESERVE(e->group, e->group_capacity, e->n_grain / DRAG_GROUP + 1);
@@ -76,27 +76,30 @@ static void exchange_pack(silt_exchange *e, double dt) {
         if (e->grain[p].cell >= 0)
             e->wet[e->n_wet++] = p;
     e->n_group = (e->n_wet + DRAG_GROUP - 1) / DRAG_GROUP;
-    for (int n = 0; n < e->n_group * DRAG_GROUP; n++) {
-        // the last group is filled up with the last grain, which weighs nothing there
-        const bool idle = n >= e->n_wet;
-        const silt_exchange_grain *g = &e->grain[e->wet[idle ? e->n_wet - 1 : n]];
-        const int *node = e->mesh->cell[g->cell], i = n % DRAG_GROUP;
-        exchange_group *to = &e->group[n / DRAG_GROUP];
-        double numbers[DRAG_NUMBERS], solid = 0.0;
-        for (int a = 0; a < 3; a++) {
-            to->place[i][a] = e->kernel.place[node[a]];
-            to->weight[i][a] = idle ? 0.0 : g->weight[a];
-            solid += g->weight[a] * e->solid[node[a]];
+    for (int m = 0; m < e->n_group; m++) {
+        exchange_group *to = &e->group[m];
+        double diameter[DRAG_GROUP], number[DRAG_GROUP], solid[DRAG_GROUP];
+        for (int i = 0; i < DRAG_GROUP; i++) {
+            // the last group is filled up with the last grain, which weighs nothing there
+            const bool idle = DRAG_GROUP * m + i >= e->n_wet;
+            const silt_exchange_grain *g = &e->grain[e->wet[idle ? e->n_wet - 1 : DRAG_GROUP * m + i]];
+            const int *node = e->mesh->cell[g->cell];
+            solid[i] = 0.0;
+            for (int a = 0; a < 3; a++) {
+                to->place[i][a] = e->kernel.place[node[a]];
+                to->weight[i][a] = idle ? 0.0 : g->weight[a];
+                solid[i] += g->weight[a] * e->solid[node[a]];
+            }
+            diameter[i] = g->diameter;
+            number[i] = idle ? 0.0 : g->number;
+            to->pace[i] = dt / g->mass;
+            to->solid[i] = idle ? 0.0 : g->solid;
+            for (int k = 0; k < 2; k++) {
+                to->v[k][i] = g->v[k];
+                to->start[k][i] = g->v[k] + dt * e->gravity[k] + to->pace[i] * g->contact[k];
+            }
         }
-        silt_drag_numbers(e->law, e->density, e->viscosity, g->diameter, g->number, solid, numbers);
-        for (int k = 0; k < DRAG_NUMBERS; k++)
-            to->number[k][i] = numbers[k];
-        to->pace[i] = dt / g->mass;
-        to->solid[i] = g->solid;
-        for (int k = 0; k < 2; k++) {
-            to->v[k][i] = g->v[k];
-            to->start[k][i] = g->v[k] + dt * (e->gravity[k] + g->contact[k] / g->mass);
-        }
+        silt_drag_numbers(e->law, e->density, e->viscosity, diameter, number, solid, to->number);
     }
 }
 
@@ -138,6 +141,43 @@ VECTOR_CLONES static void exchange_give(const silt_exchange *e, bool renew) {
             const eight one = {give[0][i], give[1][i], give[2][i], give[3][i], give[4][i]};
             for (int a = 0; a < 3; a++)
                 *(eight *)(e->give + GIVE_FIELDS * g->place[i][a]) += g->weight[i][a] * one;
+        }
+    }
+}
+
+// forces on all grains in the water, eight at a time, and their sums
+VECTOR_CLONES static void exchange_force(silt_exchange *e, silt_exchange_totals *t) {
+    eight drag_sum[2] = {{0.0}}, pressure_sum[2] = {{0.0}}, size = {0.0};
+    for (int m = 0; m < e->n_group; m++) {
+        const exchange_group *g = &e->group[m];
+        const eight *free_v = (const eight *)g->free;
+        const eight effective = *(const eight *)g->effective, solid = *(const eight *)g->solid;
+        eight felt[READ_FIELDS], drag[2], pressure[2];
+        exchange_feel(e->read, g, felt);
+        for (int k = 0; k < 2; k++) {
+            pressure[k] = -solid * felt[READ_GRADIENT + k];
+            drag[k] = effective * (felt[READ_VELOCITY + k] - free_v[k]);
+            drag_sum[k] += drag[k];
+            pressure_sum[k] += pressure[k];
+        }
+        size += eight_root(drag[0] * drag[0] + drag[1] * drag[1]) +
+                eight_root(pressure[0] * pressure[0] + pressure[1] * pressure[1]);
+        for (int i = 0; i < DRAG_GROUP && DRAG_GROUP * m + i < e->n_wet; i++) {
+            silt_exchange_grain *to = &e->grain[e->wet[DRAG_GROUP * m + i]];
+            to->effective = effective[i];
+            for (int k = 0; k < 2; k++) {
+                to->water[k] = felt[READ_VELOCITY + k][i];
+                to->free[k] = free_v[k][i];
+                to->pressure[k] = pressure[k][i];
+                to->force[k] = drag[k][i] + pressure[k][i];
+            }
+        }
+    }
+    for (int i = 0; i < DRAG_GROUP; i++) {
+        t->size += size[i];
+        for (int k = 0; k < 2; k++) {
+            t->drag[k] += drag_sum[k][i];
+            t->pressure[k] += pressure_sum[k][i];
         }
     }
 }
@@ -364,27 +404,7 @@ void silt_exchange_load(silt_exchange *e, const double *velocity, const double *
     exchange_smooth(e, velocity, pressure);
     for (int p = 0; p < e->n_grain; p++)
         e->grain[p].force[0] = e->grain[p].force[1] = 0.0;
-    for (int n = 0; n < e->n_wet; n++) {
-        silt_exchange_grain *g = &e->grain[e->wet[n]];
-        const exchange_group *from = &e->group[n / DRAG_GROUP];
-        const int i = n % DRAG_GROUP;
-        double felt[READ_FIELDS] = {0.0}, drag[2];
-        for (int a = 0; a < 3; a++)
-            for (int k = 0; k < READ_FIELDS; k++)
-                felt[k] += g->weight[a] * e->read[READ_FIELDS * from->place[i][a] + k];
-        g->effective = from->effective[i];
-        for (int k = 0; k < 2; k++) {
-            g->water[k] = felt[READ_VELOCITY + k];
-            g->free[k] = from->free[k][i];
-            g->pressure[k] = -g->solid * felt[READ_GRADIENT + k];
-            drag[k] = g->effective * (g->water[k] - g->free[k]);
-            g->force[k] = drag[k] + g->pressure[k];
-            t->drag[k] += drag[k];
-            t->pressure[k] += g->pressure[k];
-        }
-        t->size += sqrt(drag[0] * drag[0] + drag[1] * drag[1]) +
-                   sqrt(g->pressure[0] * g->pressure[0] + g->pressure[1] * g->pressure[1]);
-    }
+    exchange_force(e, t);
 }
 
 void silt_exchange_clear(silt_exchange *e) {
