@@ -15,52 +15,59 @@ static const double flat_cell =
 enum { READ_VELOCITY, READ_GRADIENT = 2, READ_FIELDS = 4 };
 enum { GIVE_DRAG, GIVE_PUSH, GIVE_FLUX = 3, GIVE_FIELDS = NESTED_FIELDS };
 
-// cells at the middle of the step, as the water's forces see them
-static void exchange_midpoint(silt_exchange *e, const double *velocity, double dt) {
-    for (int m = 0; m < e->kernel.n_near; m++) {
-        const int c = e->kernel.near[m];
-        exchange_cell *cell = &e->cell[m];
-        double x[3][2];
-        for (int a = 0; a < 3; a++)
-            for (int k = 0; k < 2; k++) {
-                int i = 2 * cell->node[a] + k;
-                x[a][k] = e->x[i] + 0.5 * dt * velocity[i];
-            }
-        double twice = (x[1][0] - x[0][0]) * (x[2][1] - x[0][1]) - (x[1][1] - x[0][1]) * (x[2][0] - x[0][0]);
-        if (!(twice / 2.0 >= flat_cell * e->kernel.area[c])) {
-            for (int a = 0; a < 3; a++)
-                for (int k = 0; k < 2; k++)
-                    cell->slope[a][k] = e->kernel.area[c] * e->kernel.gradient[c][a][k] / 3.0;
-            continue;
-        }
-        for (int a = 0; a < 3; a++) {
-            const double *p = x[(a + 1) % 3], *q = x[(a + 2) % 3];
-            cell->slope[a][0] = (p[1] - q[1]) / 6.0;
-            cell->slope[a][1] = (q[0] - p[0]) / 6.0;
-        }
+// the water's velocity and pressure at the nodes that are looked at
+static void exchange_gather(const silt_exchange *e, const double *velocity, const double *pressure, double (*out)[3]) {
+    for (int k = 0; k < e->n_look; k++) {
+        const int i = e->look[k];
+        out[k][0] = velocity[2 * i];
+        out[k][1] = velocity[2 * i + 1];
+        out[k][2] = pressure[i];
+    }
+}
+
+// nodes at the middle of the step, where the water's forces see them, for the velocity that was seen last
+static void exchange_midpoint(silt_exchange *e, double dt) {
+    for (int k = 0; k < e->n_look; k++)
+        for (int d = 0; d < 2; d++)
+            e->middle[k][d] = e->rest[k][d] + 0.5 * dt * e->seen[k][d];
+}
+
+// A third of the cell's area times the gradients of its shape functions, m, at the middle of the step. (Kept for all cells they take
+// as long to read as to make: 10k grains, 2 % of a step.)
+static inline void exchange_slope(const silt_exchange *e, const exchange_cell *cell, double slope[3][2]) {
+    const double(*x)[2] = (const double(*)[2])e->middle;
+    const int *at = cell->at;
+    const double twice = (x[at[1]][0] - x[at[0]][0]) * (x[at[2]][1] - x[at[0]][1]) -
+                         (x[at[1]][1] - x[at[0]][1]) * (x[at[2]][0] - x[at[0]][0]);
+    if (!(twice >= cell->least))
+        x = (const double(*)[2])e->rest;
+    for (int a = 0; a < 3; a++) {
+        const double *p = x[at[(a + 1) % 3]], *q = x[at[(a + 2) % 3]];
+        slope[a][0] = (p[1] - q[1]) / 6.0;
+        slope[a][1] = (q[0] - p[0]) / 6.0;
     }
 }
 
 // Velocity and pressure gradient as grains feel them: sum_i w_ip u_i is the value of H^-1 M u at a grain, and that of
-// H^-1 sum_e A_e/3 grad p_e the gradient. One solve for both.
-static void exchange_smooth(silt_exchange *e, const double *velocity, const double *pressure) {
+// H^-1 sum_e A_e/3 grad p_e the gradient. One solve for both. water: velocity and pressure at the nodes that are looked at
+static void exchange_smooth(silt_exchange *e, const double (*water)[3]) {
     double(*read)[READ_FIELDS] = (double(*)[READ_FIELDS])e->read;
     for (int m = 0; m < e->kernel.n_node; m++) {
-        const int i = e->kernel.node[m];
-        read[m][READ_VELOCITY] = e->kernel.volume[i] * velocity[2 * i];
-        read[m][READ_VELOCITY + 1] = e->kernel.volume[i] * velocity[2 * i + 1];
+        read[m][READ_VELOCITY] = e->volume[m] * water[m][0];
+        read[m][READ_VELOCITY + 1] = e->volume[m] * water[m][1];
         read[m][READ_GRADIENT] = read[m][READ_GRADIENT + 1] = 0.0;
     }
-    memset(read[e->kernel.n_node], 0, sizeof *read); // of nodes that the kernel does not hold
+    for (int m = e->kernel.n_node; m <= e->n_look; m++) // nodes that the kernel does not hold
+        memset(read[m], 0, sizeof *read);
     for (int m = 0; m < e->kernel.n_near; m++) {
         const exchange_cell *cell = &e->cell[m];
-        double slope[2];
+        double slope[3][2], sum[2];
+        exchange_slope(e, cell, slope);
         for (int k = 0; k < 2; k++)
-            slope[k] = cell->slope[0][k] * pressure[cell->node[0]] + cell->slope[1][k] * pressure[cell->node[1]] +
-                       cell->slope[2][k] * pressure[cell->node[2]];
+            sum[k] = slope[0][k] * water[cell->at[0]][2] + slope[1][k] * water[cell->at[1]][2] + slope[2][k] * water[cell->at[2]][2];
         for (int a = 0; a < 3; a++)
             for (int k = 0; k < 2; k++)
-                read[cell->place[a]][READ_GRADIENT + k] += slope[k];
+                read[cell->at[a]][READ_GRADIENT + k] += sum[k];
     }
     silt_kernel_solve(&e->kernel, READ_FIELDS, e->read);
 }
@@ -72,9 +79,11 @@ static void exchange_pack(silt_exchange *e, double dt) {
     SILT_RESERVE(e->wet, e->wet_capacity, e->n_grain + DRAG_GROUP);
     SILT_RESERVE(e->group, e->group_capacity, e->n_grain / DRAG_GROUP + 1);
     e->n_wet = 0;
-    for (int p = 0; p < e->n_grain; p++)
+    for (int p = 0; p < e->n_grain; p++) {
+        e->grain[p].force[0] = e->grain[p].force[1] = 0.0;
         if (e->grain[p].cell >= 0)
             e->wet[e->n_wet++] = p;
+    }
     e->n_group = (e->n_wet + DRAG_GROUP - 1) / DRAG_GROUP;
     for (int m = 0; m < e->n_group; m++) {
         exchange_group *to = &e->group[m];
@@ -184,45 +193,41 @@ VECTOR_CLONES static void exchange_force(silt_exchange *e, silt_exchange_totals 
 
 // source_j = integral of grad N_j . s, s the smoothed flux of solid at the middle of the step
 static void exchange_source(silt_exchange *e) {
-    const double *flux = e->give + GIVE_FLUX;
-    for (int m = 0; m < e->kernel.n_near; m++)
-        for (int a = 0; a < 3; a++)
-            e->source[e->cell[m].node[a]] = 0.0;
+    const double(*flux)[GIVE_FIELDS] = (const double(*)[GIVE_FIELDS])(e->give + GIVE_FLUX);
+    memset(e->flow, 0, (size_t)e->n_look * sizeof *e->flow);
     for (int m = 0; m < e->kernel.n_near; m++) {
         const exchange_cell *cell = &e->cell[m];
-        double sum[2];
+        double slope[3][2], sum[2];
+        exchange_slope(e, cell, slope);
         for (int k = 0; k < 2; k++)
-            sum[k] = flux[GIVE_FIELDS * cell->place[0] + k] + flux[GIVE_FIELDS * cell->place[1] + k] +
-                     flux[GIVE_FIELDS * cell->place[2] + k];
+            sum[k] = flux[cell->at[0]][k] + flux[cell->at[1]][k] + flux[cell->at[2]][k];
         for (int a = 0; a < 3; a++)
-            e->source[cell->node[a]] += cell->slope[a][0] * sum[0] + cell->slope[a][1] * sum[1];
+            e->flow[cell->at[a]] += slope[a][0] * sum[0] + slope[a][1] * sum[1];
     }
+    for (int k = 0; k < e->n_look; k++)
+        e->source[e->look[k]] = e->flow[k];
 }
 
 // True when the last update saw this velocity and pressure at all nodes that it looks at: what it found stands. The water's first
 // iterate is what the step began with, one update in five.
 static bool exchange_seen(silt_exchange *e, const double *velocity, const double *pressure) {
-    bool same = true;
-    for (int k = 0; k < e->n_look; k++) {
-        const int i = e->look[k];
-        const double now[3] = {velocity[2 * i], velocity[2 * i + 1], pressure[i]};
-        same = same && e->seen[k][0] == now[0] && e->seen[k][1] == now[1] && e->seen[k][2] == now[2];
-        memcpy(e->seen[k], now, sizeof now);
-    }
-    return same;
+    double(*before)[3] = e->seen;
+    e->seen = e->spare;
+    e->spare = before;
+    exchange_gather(e, velocity, pressure, e->seen);
+    return memcmp(before, e->seen, (size_t)e->n_look * sizeof *before) == 0;
 }
 
 // What the nodes get of the smoothed fields. @return the largest change of the drag's density since the last update, over the largest
 // density
-static double exchange_take(silt_exchange *e, const double *velocity) {
+static double exchange_take(silt_exchange *e) {
     double change = 0.0, most = 0.0;
     for (int m = 0; m < e->kernel.n_node; m++) {
         const int i = e->kernel.node[m];
-        const double *give = e->give + GIVE_FIELDS * m, volume = e->kernel.volume[i];
+        const double *give = e->give + GIVE_FIELDS * m, *u = e->seen[m], volume = e->volume[m];
         double off = 0.0, size = 0.0;
         for (int k = 0; k < 2; k++) {
-            const double old = e->push[2 * i + k] - e->coefficient[i] * velocity[2 * i + k];
-            const double drag = give[GIVE_PUSH + k] - give[GIVE_DRAG] * velocity[2 * i + k];
+            const double old = e->push[2 * i + k] - e->coefficient[i] * u[k], drag = give[GIVE_PUSH + k] - give[GIVE_DRAG] * u[k];
             off += volume > 0.0 ? silt_square(drag - old / volume) : 0.0;
             size += silt_square(drag);
             e->push[2 * i + k] = volume * give[GIVE_PUSH + k];
@@ -239,23 +244,17 @@ static double exchange_take(silt_exchange *e, const double *velocity) {
 // the drag is the step's last.
 static void exchange_update(void *self, const double *velocity, const double *pressure, double dt) {
     silt_exchange *e = self;
-    const bool fresh = dt != e->dt;
-    if (!fresh && e->steady) {
-        exchange_midpoint(e, velocity, dt); // where the water's pressure acts, and with it that on the grains
+    const bool fresh = dt != e->dt, seen = exchange_seen(e, velocity, pressure);
+    if (!fresh && (e->steady || seen))
         return;
-    }
-    if (!fresh && exchange_seen(e, velocity, pressure))
-        return;
-    if (fresh) {
-        exchange_seen(e, velocity, pressure);
+    if (fresh)
         exchange_pack(e, dt);
-    }
-    exchange_midpoint(e, velocity, dt);
-    exchange_smooth(e, velocity, pressure);
-    memset(e->give, 0, GIVE_FIELDS * ((size_t)e->kernel.n_node + 1) * sizeof *e->give);
+    exchange_midpoint(e, dt);
+    exchange_smooth(e, (const double(*)[3])e->seen);
+    memset(e->give, 0, GIVE_FIELDS * ((size_t)e->n_look + 1) * sizeof *e->give);
     exchange_give(e, e->refresh || fresh);
     silt_kernel_solve(&e->kernel, GIVE_FIELDS, e->give);
-    const double change = exchange_take(e, velocity);
+    const double change = exchange_take(e);
     exchange_source(e);
     e->steady = !fresh && change <= drag_steady;
     e->dt = dt;
@@ -316,6 +315,40 @@ static void exchange_choose(silt_exchange *e) {
     }
 }
 
+// The nodes of all cells near: those of the kernel in its order, then the others; what an update needs of them stands together
+static void exchange_look(silt_exchange *e) {
+    const silt_kernel *kernel = &e->kernel;
+    const silt_mesh *mesh = e->mesh;
+    SILT_RESERVE(e->look, e->look_capacity[0], mesh->n_node);
+    SILT_RESERVE(e->cell, e->cell_capacity, kernel->n_near);
+    e->n_look = kernel->n_node;
+    memcpy(e->look, kernel->node, (size_t)kernel->n_node * sizeof *e->look);
+    int *at = e->index;
+    memcpy(at, kernel->place, (size_t)mesh->n_node * sizeof *at);
+    for (int m = 0; m < kernel->n_near; m++)
+        for (int a = 0; a < 3; a++) {
+            const int i = mesh->cell[kernel->near[m]][a];
+            if (at[i] == kernel->n_node && !e->chosen[i]) {
+                e->chosen[i] = 1;
+                at[i] = e->n_look;
+                e->look[e->n_look++] = i;
+            }
+            e->cell[m].at[a] = at[i];
+            e->cell[m].least = 2.0 * flat_cell * kernel->area[kernel->near[m]];
+        }
+    SILT_RESERVE(e->rest, e->look_capacity[1], e->n_look);
+    SILT_RESERVE(e->seen, e->look_capacity[2], e->n_look);
+    SILT_RESERVE(e->spare, e->look_capacity[3], e->n_look);
+    SILT_RESERVE(e->flow, e->look_capacity[4], e->n_look);
+    SILT_RESERVE(e->volume, e->look_capacity[5], e->n_look);
+    SILT_RESERVE(e->middle, e->look_capacity[6], e->n_look);
+    for (int k = 0; k < e->n_look; k++) {
+        e->rest[k][0] = e->x[2 * e->look[k]];
+        e->rest[k][1] = e->x[2 * e->look[k] + 1];
+        e->volume[k] = kernel->volume[e->look[k]];
+    }
+}
+
 // true when mesh and grains stand where they stood at the last place
 bool silt_exchange_stands(const silt_exchange *e, const silt_nodes *nodes, const silt_mesh *mesh) {
     return e->placed && e->mesh == mesh && e->revision == mesh->revision && e->n_node == mesh->n_node &&
@@ -334,25 +367,13 @@ silt_status silt_exchange_place(silt_exchange *e, const silt_nodes *nodes, const
     SILT_RESERVE(e->push, e->node_capacity[2], 2 * n);
     SILT_RESERVE(e->source, e->node_capacity[3], n);
     SILT_RESERVE(e->chosen, e->node_capacity[6], n);
+    SILT_RESERVE(e->index, e->node_capacity[8], n);
     SILT_RESERVE(e->placed_x, e->node_capacity[7], 2 * n);
     exchange_choose(e);
     SILT_TRY(silt_kernel_build(&e->kernel, mesh, nodes->x, e->chosen, e->width, err));
-    SILT_RESERVE(e->read, e->node_capacity[4], READ_FIELDS * (e->kernel.n_node + 1));
-    SILT_RESERVE(e->give, e->node_capacity[5], GIVE_FIELDS * (e->kernel.n_node + 1));
-    SILT_RESERVE(e->cell, e->cell_capacity, e->kernel.n_near);
-    for (int m = 0; m < e->kernel.n_near; m++)
-        for (int a = 0; a < 3; a++) {
-            const int i = mesh->cell[e->kernel.near[m]][a];
-            e->cell[m].node[a] = i;
-            e->cell[m].place[a] = e->kernel.place[i];
-            e->chosen[i] = 1;
-        }
-    SILT_RESERVE(e->look, e->node_capacity[8], n);
-    e->n_look = 0;
-    for (int i = 0; i < n; i++)
-        if (e->chosen[i])
-            e->look[e->n_look++] = i;
-    SILT_RESERVE(e->seen, e->node_capacity[9], e->n_look);
+    exchange_look(e);
+    SILT_RESERVE(e->read, e->node_capacity[4], READ_FIELDS * (e->n_look + 1));
+    SILT_RESERVE(e->give, e->node_capacity[5], GIVE_FIELDS * (e->n_look + 1));
 
     // solid fraction
     memset(e->solid, 0, (size_t)n * sizeof *e->solid);
@@ -396,14 +417,15 @@ void silt_exchange_load(silt_exchange *e, const double *velocity, const double *
     *t = (silt_exchange_totals){0};
     if (dt != e->dt) // the water was told of another step than it took: nothing to hold on to but the new one
         exchange_update(e, velocity, pressure, dt);
-    for (int i = 0; i < e->n_node; i++)
-        for (int k = 0; k < 2; k++)
-            t->water[k] += e->push[2 * i + k] - e->coefficient[i] * velocity[2 * i + k];
+    // the pressure on the grains acts where the water's does: on the mesh of the last iterate
+    exchange_midpoint(e, dt);
+    exchange_gather(e, velocity, pressure, e->spare);
+    for (int m = 0; m < e->kernel.n_node; m++)
+        for (int k = 0, i = e->kernel.node[m]; k < 2; k++)
+            t->water[k] += e->push[2 * i + k] - e->coefficient[i] * e->spare[m][k];
 
     // drag as the water felt it: accepted velocity, free velocity of the last update
-    exchange_smooth(e, velocity, pressure);
-    for (int p = 0; p < e->n_grain; p++)
-        e->grain[p].force[0] = e->grain[p].force[1] = 0.0;
+    exchange_smooth(e, (const double(*)[3])e->spare);
     exchange_force(e, t);
 }
 
@@ -417,6 +439,12 @@ void silt_exchange_clear(silt_exchange *e) {
     free(e->read);
     free(e->give);
     free(e->seen);
+    free(e->spare);
+    free(e->rest);
+    free(e->middle);
+    free(e->flow);
+    free(e->volume);
+    free(e->index);
     free(e->look);
     free(e->chosen);
     free(e->placed_x);

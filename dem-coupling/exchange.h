@@ -41,8 +41,8 @@ typedef struct silt_exchange_totals {
 
 /** a cell of the water near to grains */
 typedef struct exchange_cell {
-    int node[3], place[3]; // in the mesh, in the kernel's order
-    double slope[3][2];    // m, a third of the area times the gradients of the corners' shape functions, at the middle of the step
+    int at[3];    // corners, among the nodes that are looked at
+    double least; // m2, twice the area below which the cell counts as at the start of the step
 } exchange_cell;
 
 /** eight grains in the water: what a step's updates read and write of them */
@@ -86,10 +86,15 @@ typedef struct silt_exchange {
     bool placed;
     int64_t revision; // of the mesh then
     int n_placed_cell, *bin; // owned, grid around the grains
-    int n_look, *look;       // owned, nodes that an update looks at
-    double (*seen)[3];       // owned, velocity and pressure there in the last update
-    bool steady;             // that changed little: it stands for the rest of the step
-    int node_capacity[10], cell_capacity, bin_capacity, wet_capacity, group_capacity;
+    int *index;              // owned, per node of the mesh: among those that are looked at
+    int n_look, *look;       // owned, nodes that an update looks at: the kernel's in its order, then others of their cells
+    double (*rest)[2];       // owned, m, of those, positions at the start of the step
+    double (*middle)[2];     // owned, m, at its middle
+    double (*seen)[3];       // owned, of those, velocity and pressure of the last iterate
+    double (*spare)[3];      // owned, room for another
+    double *volume, *flow;   // owned, of those, m2 and m2/s
+    bool steady;             // the last update changed little: it stands for the rest of the step
+    int node_capacity[9], look_capacity[7], cell_capacity, bin_capacity, wet_capacity, group_capacity;
 } silt_exchange;
 
 /** Spreads the grains over the water around them, their place in the mesh (cell, weight) given: the solid fraction. */

@@ -19,11 +19,11 @@ static void kernel_choose(silt_kernel *kernel, const silt_mesh *mesh, const uint
     }
 }
 
-// cell geometry and lumped volumes
-static silt_status kernel_measure(silt_kernel *kernel, const silt_mesh *mesh, const double *x, silt_error *err) {
+// lumped volumes, and b^2/4 K cell by cell
+static silt_status kernel_measure(silt_kernel *kernel, const silt_mesh *mesh, const double *x, double width, silt_error *err) {
     SILT_RESERVE(kernel->volume, kernel->node_capacity[2], mesh->n_node);
     SILT_RESERVE(kernel->area, kernel->cell_capacity[1], mesh->n_cell);
-    SILT_RESERVE(kernel->gradient, kernel->cell_capacity[2], mesh->n_cell);
+    SILT_RESERVE(kernel->edge, kernel->cell_capacity[2], mesh->n_cell);
     memset(kernel->volume, 0, (size_t)mesh->n_node * sizeof *kernel->volume);
     for (int k = 0; k < kernel->n_near; k++) {
         const int e = kernel->near[k], *node = mesh->cell[e];
@@ -35,39 +35,28 @@ static silt_status kernel_measure(silt_kernel *kernel, const silt_mesh *mesh, co
                 "porosity kernel: water cell %d (nodes %d %d %d) near (%g, %g) has the area %g m2, must be above 0", e,
                 node[0], node[1], node[2], a[0], a[1], twice / 2.0);
         kernel->area[e] = twice / 2.0;
+        // gradients are the sides across, turned and over `twice`
+        const double side[3][2] = {{c[0] - b[0], c[1] - b[1]}, {a[0] - c[0], a[1] - c[1]}, {b[0] - a[0], b[1] - a[1]}};
+        const double weight = width * width / 4.0 / (2.0 * twice);
         for (int d = 0; d < 3; d++) {
-            const double *p = x + 2 * node[(d + 1) % 3], *q = x + 2 * node[(d + 2) % 3];
-            kernel->gradient[e][d][0] = (p[1] - q[1]) / twice;
-            kernel->gradient[e][d][1] = (q[0] - p[0]) / twice;
+            const double *p = side[(d + 1) % 3], *q = side[(d + 2) % 3];
+            kernel->edge[e][d] = weight * (p[0] * q[0] + p[1] * q[1]);
             kernel->volume[node[d]] += twice / 6.0;
         }
     }
     return SILT_OK;
 }
 
-// H = M + b^2/4 K; a node without a cell keeps what is asked of it
-static void kernel_numbers(silt_kernel *kernel, const silt_mesh *mesh, double width) {
+silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const double *x, const uint8_t *chosen,
+                              double width, silt_error *err) {
+    kernel_choose(kernel, mesh, chosen);
+    SILT_TRY(kernel_measure(kernel, mesh, x, width, err));
+    // a node without a cell keeps what is asked of it
     SILT_RESERVE(kernel->diagonal, kernel->node_capacity[3], mesh->n_node);
-    SILT_RESERVE(kernel->edge, kernel->cell_capacity[3], mesh->n_cell);
     for (int k = 0; k < kernel->n_node; k++) {
         const int i = kernel->node[k];
         kernel->diagonal[i] = kernel->volume[i] > 0.0 ? kernel->volume[i] : 1.0;
     }
-    for (int k = 0; k < kernel->n_near; k++) {
-        const int e = kernel->near[k];
-        const double(*g)[2] = (const double(*)[2])kernel->gradient[e], weight = width * width / 4.0 * kernel->area[e];
-        for (int c = 0; c < 3; c++) {
-            const double *p = g[(c + 1) % 3], *q = g[(c + 2) % 3];
-            kernel->edge[e][c] = weight * (p[0] * q[0] + p[1] * q[1]);
-        }
-    }
-}
-
-silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const double *x, const uint8_t *chosen,
-                              double width, silt_error *err) {
-    kernel_choose(kernel, mesh, chosen);
-    SILT_TRY(kernel_measure(kernel, mesh, x, err));
-    kernel_numbers(kernel, mesh, width);
     silt_nested_order(&kernel->nested, mesh, x, kernel->n_node, kernel->node, kernel->place);
     const int bad = silt_nested_factor(kernel->nested, mesh, kernel->diagonal, (const double(*)[3])kernel->edge);
     if (bad >= 0)
@@ -94,8 +83,8 @@ void silt_kernel_smooth(silt_kernel *kernel, double *field) {
 
 void silt_kernel_clear(silt_kernel *kernel) {
     silt_nested_free(&kernel->nested);
-    void *owned[] = {kernel->volume, kernel->area,  kernel->gradient, kernel->edge, kernel->diagonal,
-                     kernel->node,   kernel->place, kernel->near,     kernel->work};
+    void *owned[] = {kernel->volume, kernel->area,  kernel->edge, kernel->diagonal,
+                     kernel->node,   kernel->place, kernel->near, kernel->work};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
     *kernel = (silt_kernel){0};

@@ -13,12 +13,11 @@ typedef struct silt_kernel {
     int *place;               // owned, per node of the mesh: place in node, n_node: it is none of them
     int n_near, *near;        // owned, the mesh's cells that touch one of them, rising
     double *volume;           // owned, m2 per node of the mesh, a third of the cells around it; 0 without a cell
-    double *area;             // owned, m2 per cell of the mesh, of those in near; so is gradient
-    double (*gradient)[3][2]; // owned, 1/m, of the cell's three shape functions
+    double *area;             // owned, m2 per cell of the mesh, of those in near; so is edge
     double (*edge)[3];        // owned, m2, b^2/4 K between the corners across from each
     double *diagonal;         // owned, m2, of M per node of the mesh
     double *work;             // owned, of a solve
-    int work_capacity, node_capacity[4], cell_capacity[4];
+    int work_capacity, node_capacity[4], cell_capacity[3];
     silt_nested *nested; // owned
 } silt_kernel;
 
