@@ -68,8 +68,8 @@ static silt_status coupling_shapes(silt_coupling *c, silt_error *err) {
     return SILT_OK;
 }
 
-// widths, radii, time step and everything else that the worker is told once; walls are owned by the caller
-static void coupling_measure(silt_coupling *c, const silt_coupling_def *def, silt_dem_def *dem, double (**wall)[4]) {
+// widths, radii, time step and everything else that the worker is told once
+static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     const silt_scene *scene = c->scene;
     const silt_contact_def *contact = &scene->contact;
     const silt_grains_def *grains = &scene->grains;
@@ -133,13 +133,13 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def, sil
         c->exchange.gravity[k] = scene->gravity[k];
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
-    *wall = silt_alloc((size_t)c->walls->count, sizeof **wall);
+    c->wall = silt_alloc((size_t)c->walls->count + 1, sizeof *c->wall);
     for (int i = 0; i < c->walls->count; i++)
         for (int k = 0; k < 2; k++) {
-            (*wall)[i][k] = c->walls->from[i][k];
-            (*wall)[i][2 + k] = c->walls->to[i][k];
+            c->wall[i][k] = c->walls->from[i][k];
+            c->wall[i][2 + k] = c->walls->to[i][k];
         }
-    *dem = (silt_dem_def){
+    c->dem_def = (silt_dem_def){
         .worker = def->worker,
         .log = def->log,
         .lo = {def->lo[0], def->lo[1]},
@@ -154,7 +154,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def, sil
         .body_friction = contact->body_friction,
         .step = c->step,
         .n_wall = c->walls->count,
-        .wall = (const double(*)[4]) * wall,
+        .wall = (const double(*)[4])c->wall,
         .max_radius = largest,
         .min_radius = smallest,
         .no_contacts = !scene->bed.on || !scene->bed.deposition,
@@ -534,10 +534,32 @@ static void coupling_receive(silt_coupling *c, coupling_grain *g, const silt_dem
     g->net = hypot(net[0], net[1]);
 }
 
+// a grain that LIGGGHTS no longer has: over an outlet, or lost
+static bool coupling_left_domain(const silt_coupling *c, const coupling_grain *g) {
+    const double ahead[2] = {g->old_x[0] + 2.0 * c->elapsed * g->v[0], g->old_x[1] + 2.0 * c->elapsed * g->v[1]};
+    return coupling_leaves(&c->scene->fluid, g->old_x, ahead, 4.0 * g->radius);
+}
+
+// nothing is changed before it is sure that no grain is lost
+static silt_status coupling_complete(const silt_coupling *c, const silt_dem_state *state, silt_error *err) {
+    for (int i = 0, k = 0; i < c->n_grain && state->n_grain != c->n_grain; i++) {
+        const coupling_grain *g = &c->grain[i];
+        while (k < state->n_grain && state->id[k] < g->id)
+            k++;
+        if ((k == state->n_grain || state->id[k] != g->id) && !coupling_left_domain(c, g))
+            return silt_fail(
+                err, SILT_FAILED,
+                "grain %lld vanished: last seen at (%g, %g) with the velocity (%g, %g) m/s and the radius %g m; it "
+                "crossed no outlet, so it went through a wall or out of the scene where nothing closes it",
+                (long long)g->id, g->old_x[0], g->old_x[1], g->v[0], g->v[1], g->radius);
+    }
+    return SILT_OK;
+}
+
 static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
     SILT_TRY(silt_dem_wait(c->dem, err));
     const silt_dem_state *state = silt_dem_state_now(c->dem);
-    const silt_fluid_def *fluid = &c->scene->fluid;
+    SILT_TRY(coupling_complete(c, state, err));
     c->contact[0] = c->contact[1] = 0.0;
     coupling_touched(c);
     for (int i = 0, k = 0; i < c->n_grain; i++) {
@@ -546,21 +568,12 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
             k++;
         if (k < state->n_grain && state->id[k] == g->id) {
             coupling_receive(c, g, state, k);
-            if (coupling_leaves(fluid, g->old_x, g->x, 0.0))
+            if (coupling_leaves(&c->scene->fluid, g->old_x, g->x, 0.0))
                 coupling_leave(c, g);
-            continue;
+        } else {
+            g->sent = false;
+            coupling_leave(c, g);
         }
-
-        // LIGGGHTS no longer has it: over an outlet, or lost
-        double ahead[2] = {g->old_x[0] + 2.0 * c->elapsed * g->v[0], g->old_x[1] + 2.0 * c->elapsed * g->v[1]};
-        if (!coupling_leaves(fluid, g->old_x, ahead, 4.0 * g->radius))
-            return silt_fail(
-                err, SILT_FAILED,
-                "grain %lld vanished: last seen at (%g, %g) with the velocity (%g, %g) m/s and the radius %g m; it "
-                "crossed no outlet, so it went through a wall or out of the scene where nothing closes it",
-                (long long)g->id, g->old_x[0], g->old_x[1], g->v[0], g->v[1], g->radius);
-        g->sent = false;
-        coupling_leave(c, g);
     }
 
     SILT_RESERVE(c->last, c->last_capacity, state->n_grain);
@@ -583,15 +596,14 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
 // ---------------------------------------------------------------- open and close
 
 // all but the worker: scene, shapes, sizes
-static silt_status coupling_create(silt_coupling **coupling, const silt_coupling_def *def, silt_dem_def *dem,
-                                   double (**wall)[4], silt_error *err) {
+static silt_status coupling_create(silt_coupling **coupling, const silt_coupling_def *def, silt_error *err) {
     silt_coupling *c = *coupling = silt_alloc(1, sizeof *c);
     c->scene = def->scene;
     c->walls = def->walls;
     c->next_id = c->sent_id = 1;
     c->view = silt_alloc(1, sizeof *c->view);
     SILT_TRY(coupling_shapes(c, err));
-    coupling_measure(c, def, dem, wall);
+    coupling_measure(c, def);
     return SILT_OK;
 }
 
@@ -613,6 +625,29 @@ static silt_status coupling_send_bodies(silt_coupling *c, silt_error *err) {
     return SILT_OK;
 }
 
+static silt_status coupling_open_dem(silt_coupling *c, silt_error *err) {
+    SILT_TRY(silt_dem_open(&c->dem, &c->dem_def, err));
+    return coupling_send_bodies(c, err);
+}
+
+static silt_status coupling_recover(silt_coupling *c, silt_error *err) {
+    if (!silt_dem_own_fault(c->dem))
+        return SILT_FAILED;
+    silt_dem_close(&c->dem);
+    c->dem_def.append = true;
+    SILT_TRY(coupling_open_dem(c, err));
+    // it is told of everything anew
+    coupling_compact(c);
+    for (int i = 0; i < c->n_grain; i++)
+        c->grain[i].sent = false;
+    for (int k = 0; k < c->frozen.count; k++)
+        c->frozen.sphere[k].sent = false;
+    c->sent_id = 0;
+    c->n_drop = c->n_last = 0;
+    SILT_TRY(coupling_start(c, 0, err));
+    return coupling_finish(c, err);
+}
+
 static void coupling_listed(silt_coupling *c) {
     for (int i = 0; i < c->scene->grains.n_grain; i++) {
         const silt_grain_def *def = &c->scene->grains.grain[i];
@@ -625,14 +660,10 @@ static void coupling_listed(silt_coupling *c) {
 }
 
 static silt_status coupling_open(silt_coupling **coupling, const silt_coupling_def *def, silt_error *err) {
-    silt_dem_def dem;
-    double(*wall)[4] = NULL;
-    silt_status status = coupling_create(coupling, def, &dem, &wall, err);
+    silt_status status = coupling_create(coupling, def, err);
     silt_coupling *c = *coupling;
     if (status == SILT_OK)
-        status = silt_dem_open(&c->dem, &dem, err);
-    if (status == SILT_OK)
-        status = coupling_send_bodies(c, err);
+        status = coupling_open_dem(c, err);
     if (status != SILT_OK)
         goto done;
 
@@ -644,7 +675,6 @@ static silt_status coupling_open(silt_coupling **coupling, const silt_coupling_d
     if (status == SILT_OK)
         status = coupling_finish(c, err);
 done:
-    free(wall);
     if (status != SILT_OK)
         coupling_close(coupling);
     return status;
@@ -655,6 +685,7 @@ static void coupling_close(silt_coupling **coupling) {
     if (c == NULL)
         return;
     silt_dem_close(&c->dem);
+    free(c->wall);
     for (int i = 0; i < c->bodies->count; i++) {
         silt_outline_clear(&c->body[i].shape);
         silt_clump_clear(&c->body[i].clump);
@@ -709,14 +740,12 @@ static silt_status coupling_save(silt_coupling *c, silt_store *store, silt_error
 
 static silt_status coupling_load_state(silt_coupling **coupling, const silt_coupling_def *def, silt_store *store,
                                        silt_error *err) {
-    silt_dem_def dem;
-    double(*wall)[4] = NULL;
-    silt_status status = coupling_create(coupling, def, &dem, &wall, err);
+    silt_status status = coupling_create(coupling, def, err);
+    silt_coupling *c = *coupling;
     if (status == SILT_OK)
-        status = silt_checkpoint_load(*coupling, store, err);
+        status = silt_checkpoint_load(c, store, err);
     if (status == SILT_OK)
-        status = silt_dem_load(&(*coupling)->dem, &dem, store, err);
-    free(wall);
+        status = silt_dem_load(&c->dem, &c->dem_def, store, err);
     if (status != SILT_OK)
         coupling_close(coupling);
     return status;
@@ -739,6 +768,7 @@ const silt_coupling_type silt_coupling_dem = {
     .keep = coupling_keep,
     .start = coupling_start,
     .finish = coupling_finish,
+    .recover = coupling_recover,
     .left = coupling_left,
     .save = coupling_save,
     .load_state = coupling_load_state,

@@ -53,6 +53,10 @@ int silt_dem_process(const silt_dem *dem) {
     return dem->link.pid;
 }
 
+bool silt_dem_own_fault(const silt_dem *dem) {
+    return !dem->link.failed || dem->link.gave_up;
+}
+
 static bool dem_finite(int n, const double *value) {
     for (int i = 0; i < n; i++)
         if (!isfinite(value[i]))
@@ -206,7 +210,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
 silt_status silt_dem_open(silt_dem **dem, const silt_dem_def *def, silt_error *err) {
     silt_dem *d = NULL;
     *dem = NULL;
-    silt_status status = dem_create(&d, def, false, err);
+    silt_status status = dem_create(&d, def, def->append, err);
     if (status == SILT_OK)
         status = dem_tell(d, DEM_OPEN, 0, err);
     if (status == SILT_OK)

@@ -14,6 +14,7 @@ typedef struct silt_dem silt_dem; // opaque, owns the worker and the shared memo
 typedef struct silt_dem_def {
     const char *worker;  // path of silt-dem
     const char *log;     // file that LIGGGHTS writes to (its screen), e.g. OUT/dem.log
+    bool append;         // to what stands in it
     double lo[2], hi[2]; // the box in x and y; a sphere that leaves it is gone
     double period;       // m, periodic length in z (at least 3 times the largest sphere's diameter)
     double gravity[3];
@@ -95,6 +96,8 @@ const silt_dem_state *silt_dem_state_now(const silt_dem *dem);
  * as a loaded one. */
 silt_status silt_dem_save(silt_dem *dem, silt_store *store, silt_error *err);
 silt_status silt_dem_load(silt_dem **dem, const silt_dem_def *def, silt_store *store, silt_error *err);
+/** true when the worker runs, or failed at what it was told to do; false when it was ended from outside */
+bool silt_dem_own_fault(const silt_dem *dem);
 int silt_dem_process(const silt_dem *dem); // the worker's pid
 void silt_dem_close(silt_dem **dem);       // takes NULL, ends the worker, sets NULL
 /** 0.15 say of the Rayleigh time pi r sqrt(rho/G)/(0.1631 nu + 0.8766), s */

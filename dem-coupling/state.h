@@ -48,6 +48,8 @@ struct silt_coupling {
     const silt_scene *scene; // borrowed
     const silt_walls *walls; // borrowed
     silt_dem *dem;           // owned
+    silt_dem_def dem_def;    // what it was opened with; its strings are borrowed
+    double (*wall)[4];       // owned
     double width;            // m, accounting width: spheres stand for what is in this width of the slab
     double step;             // s, of the discrete elements
     double parcel;           // m, usual radius of a parcel, 0 without bed

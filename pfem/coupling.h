@@ -63,6 +63,9 @@ typedef struct silt_coupling_type {
     /** Runs n substeps: start returns at once, finish waits and refreshes grains() and bodies(). */
     silt_status (*start)(silt_coupling *coupling, int n, silt_error *err);
     silt_status (*finish)(silt_coupling *coupling, silt_error *err);
+    /** After a finish that failed, before the next prepare: new discrete elements with grains and bodies as they were at the start;
+     * contacts forget their tangential springs. @return SILT_FAILED when they were ended from outside: that is no fault of the step */
+    silt_status (*recover)(silt_coupling *coupling, silt_error *err);
     /** sediment that crossed an outlet of the scene from left to right since the start: kg per m of width, grains */
     void (*left)(const silt_coupling *coupling, double *mass, int64_t *count);
     silt_status (*save)(silt_coupling *coupling, silt_store *store, silt_error *err);
