@@ -542,7 +542,7 @@ static double strictness(const silt_fluid *f, const silt_step *s) {
 
 // Small cells of spray turn while they are solved, and are not waited for when all that is lacking is little
 static bool spray_lags(const silt_fluid *f, double tolerance) {
-    return f->iterations >= FLUID_SPRAY && f->lacking < 0.1 * tolerance && f->worst < 1e3 * tolerance;
+    return f->iterations >= FLUID_SPRAY && f->lacking < 0.01 * tolerance && f->worst < 1e3 * tolerance;
 }
 
 static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, silt_error *err) {

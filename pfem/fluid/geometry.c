@@ -3,6 +3,7 @@
 #include "fluid.h"
 #include "kernel.h"
 
+#define LEAST_WATER 0.05 // share of a cell whose inertia is there however many grains are
 #define FLAT_STEP 0.05 // a cell that shrinks below this share on its way keeps the shape it had at the start
 #define SLIVER 0.02    // gradients of a tetrahedron are bounded as if its volume were this share of a regular one's
 #define REGULAR 0.1178511 // volume of a regular tetrahedron of edge 1
@@ -205,7 +206,8 @@ static bool midpoints(silt_fluid *f, const double *x, double dt) {
     return moved != 0;
 }
 
-// masses of water between grains, and the grains' share of the cells
+// Masses of water between grains, and the grains' share of the cells. Where grains crowd, in a film of water over a heap say, their
+// share passes 1: the water keeps the inertia of a twentieth.
 KERNEL shares(const int D, silt_fluid *f, const silt_mesh *mesh, const double *solid, double rho) {
     memset(f->mass, 0, (size_t)f->n_node * sizeof(double));
     for (int e = 0; e < f->n_cell; e++) {
@@ -215,7 +217,8 @@ KERNEL shares(const int D, silt_fluid *f, const silt_mesh *mesh, const double *s
             for (int b = 0; b <= D; b++)
                 share += solid[cell[b]] * (a == b ? 2 : 1) / ((D + 1) * (D + 2));
             f->share[(D + 1) * e + a] = share;
-            f->mass[cell[a]] += rho * f->cell_volume[e] * (1.0 / (D + 1) - share);
+            const double water = 1.0 / (D + 1) - share, least = LEAST_WATER / (D + 1);
+            f->mass[cell[a]] += rho * f->cell_volume[e] * (water > least ? water : least);
         }
     }
 }
