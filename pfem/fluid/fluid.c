@@ -30,6 +30,7 @@ void silt_fluid_clear(silt_fluid *f) {
     silt_wall_normals_clear(&f->wall_normals);
     silt_depth_clear(&f->depth);
     silt_wall_law_clear(&f->law);
+    silt_parts_clear(&f->parts);
     *f = (silt_fluid){0};
 }
 
@@ -191,7 +192,7 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
         silt_tension_force(s->mesh, f->x_mid, s->scene->fluid.surface_tension, out);
     if (s->pockets)
         silt_pockets_force(s->pockets, D, 0.5 * s->dt, f->w, out);
-    silt_assemble_pressure(f, s->mesh, p, out, NULL);
+    silt_assemble_pressure(f, s->mesh, p, out);
 }
 
 // resistance of the present iterate: traction of walls, then geometry, then viscosity of every cell
@@ -296,7 +297,7 @@ static int star_continuity(silt_fluid *f, const silt_step *s, const double *p) {
 static void correct(silt_fluid *f, const silt_step *s, const double *q, double *v) {
     const int D = f->dim;
     memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
-    silt_assemble_pressure(f, s->mesh, q, f->scratch, NULL);
+    silt_assemble_pressure(f, s->mesh, q, f->scratch);
     for (int i = 0; i < f->n_node; i++) {
         if (!s->mesh->wet[i])
             continue;
@@ -391,7 +392,7 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
     f->momentum_scale = 0;
     f->worked = 0;
     if (drag)
-        silt_assemble_pressure(f, s->mesh, p, f->scratch, lost);
+        silt_assemble_pressure_lost(f, s->mesh, p, lost);
     for (int i = 0; i < f->n_node; i++) {
         if (!s->mesh->wet[i]) {
             for (int d = 0; d < D; d++)
@@ -656,6 +657,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     const silt_fluid_def *def = &s->scene->fluid;
     silt_nodes *nodes = s->nodes;
     fluid_reserve(f, s);
+    silt_parts_make(&f->parts, s->mesh);
     const int D = f->dim;
     if (!f->pressure)
         f->pressure = silt_pressure_create();
