@@ -1,8 +1,8 @@
 /** @file parallel.h
  * Loops on several threads whose results have the same bits for any number of them. There are three kinds:
  * - each item writes its own place: SILT_PARALLEL(n) before the loop;
- * - sums over all items: by chunks whose limits depend on the number of items only, added up in their order: silt_sum, or a loop
- *   of one's own over silt_chunks(n);
+ * - sums over all items: by chunks whose limits depend on the number of items only, added up in their order: silt_products, or a
+ *   loop of one's own over silt_chunks(n);
  * - cells that add to their nodes: parts of the cells, fluid/parts.h.
  * Loops over few items run on one thread: to wake others takes as long as some thousand items.
  */
@@ -13,7 +13,7 @@
 
 #define PARALLEL_LEAST 4096 // items (nodes, cells) that a thread is worth waking for
 #define PARALLEL_MOST 16    // threads that are ever used
-#define CHUNK_LENGTH 4096   // items in a chunk of a sum, at least
+#define CHUNK_LENGTH 1024   // items in a chunk of a sum, at least
 #define CHUNK_MOST 256
 
 /** threads for a loop over n items: as many as were asked for (--threads, OMP_NUM_THREADS) and are worth it */
@@ -33,5 +33,22 @@ static inline int silt_chunks(int n) {
 }
 /** first item of chunk c */
 static inline int silt_chunk_first(int n, int c) { return (int)((long long)n * c / silt_chunks(n)); }
+static inline double silt_total(int n_chunk, const double *part) {
+    double sum = 0;
+    for (int c = 0; c < n_chunk; c++)
+        sum += part[c];
+    return sum;
+}
+/** the sum of a[i] b[i] */
+static inline double silt_products(int n, const double *a, const double *b) {
+    double part[CHUNK_MOST];
+    SILT_PARALLEL(n)
+    for (int c = 0; c < silt_chunks(n); c++) {
+        part[c] = 0;
+        for (int i = silt_chunk_first(n, c); i < silt_chunk_first(n, c + 1); i++)
+            part[c] += a[i] * b[i];
+    }
+    return silt_total(silt_chunks(n), part);
+}
 
 #endif

@@ -34,6 +34,14 @@
         kernel(D, f, mesh, e_, silt_parts_aside(parts, b_), ##__VA_ARGS__);                                            \
         silt_parts_settle(parts, mesh, sums, b_);                                                                      \
     }
+/** kernel(D, f, first, last, c, ...) for the nodes of every chunk c (parallel.h) */
+#define BY_CHUNK(kernel, ...)                                                                                          \
+    do {                                                                                                               \
+        const int n_ = f->n_node;                                                                                      \
+        SILT_PARALLEL(n_)                                                                                              \
+        for (int c_ = 0; c_ < silt_chunks(n_); c_++)                                                                   \
+            BY_DIM(kernel, f, silt_chunk_first(n_, c_), silt_chunk_first(n_, c_ + 1), c_, ##__VA_ARGS__);              \
+    } while (0)
 #define SUMS(width, wide, one) ((silt_sums){width, wide, one})
 
 #endif
