@@ -1,11 +1,14 @@
 // smoothed aggregation multigrid
 #include "coarse.h"
 #include "factor.h"
+#include "parallel.h"
 
 #define COARSE_LEVELS 12
 #define COARSE_DIRECT 400  // rows that a factor takes
 #define COARSE_STRONG 0.25 // of the largest entry beside the diagonal: neighbours that are aggregated with each other
 #define COARSE_OMEGA  (4.0 / 3)
+#define COARSE_BLOCKS 4    // that a level is swept in at the same time, at most
+#define COARSE_BLOCK  6000 // rows in each, at least
 
 /** a matrix, and how it follows from the next coarser one */
 typedef struct silt_level {
@@ -17,9 +20,14 @@ typedef struct silt_level {
     float *value, *inverse;     // owned, entries, 0 on the diagonal; 1/diagonal
     int *to_start, *to;         // owned, rows of the prolongation
     float *weight;              // owned
+    int *from_start, *from;     // owned, its columns: rows that each aggregate has a share in, rising
+    float *share;               // owned, these shares
     float *x, *right;           // owned
+    float *kept;                // owned, what a sweep leaves on its way down; x before the one on its way up
+    int n_block;                // blocks of rows that are swept as if the others stood still
     int start_capacity, index_capacity, diagonal_capacity, exact_capacity, value_capacity, inverse_capacity,
-        to_start_capacity, to_capacity, weight_capacity, x_capacity, right_capacity;
+        to_start_capacity, to_capacity, weight_capacity, from_start_capacity, from_capacity, share_capacity, x_capacity, right_capacity,
+        kept_capacity;
 } silt_level;
 
 struct silt_coarse {
@@ -47,6 +55,10 @@ void silt_coarse_free(silt_coarse **coarse) {
         free(a->to_start);
         free(a->to);
         free(a->weight);
+        free(a->from_start);
+        free(a->from);
+        free(a->share);
+        free(a->kept);
         free(a->x);
         free(a->right);
     }
@@ -60,6 +72,17 @@ void silt_coarse_free(silt_coarse **coarse) {
     *coarse = NULL;
 }
 
+// The sweeps of Gauss-Seidel go through blocks of rows at the same time, each with the others' old values. The blocks hang on the number
+// of rows alone. Four in place of one take 40.7 iterations
+// in place of 39.3 at 46k nodes; two take 39.7 in place of 38.3 at 12.7k.
+static int blocks(int n) {
+    int count = 1;
+    while (2 * count <= COARSE_BLOCKS && 2 * count * COARSE_BLOCK <= n)
+        count *= 2;
+    return count;
+}
+static int block_first(const silt_level *a, int block) { return (int)((int64_t)a->n * block / a->n_block); }
+
 // single precision copies for the cycle. @return false where the diagonal is not positive
 static bool level_copy(silt_level *a, const double *value) {
     const int filled = a->start[a->n];
@@ -68,19 +91,22 @@ static bool level_copy(silt_level *a, const double *value) {
     SILT_RESERVE(a->diagonal, a->diagonal_capacity, a->n + 1);
     SILT_RESERVE(a->x, a->x_capacity, a->n + 1);
     SILT_RESERVE(a->right, a->right_capacity, a->n + 1);
-    for (int k = 0; k < filled; k++)
-        a->value[k] = (float)value[k];
+    SILT_RESERVE(a->kept, a->kept_capacity, a->n + 1);
+    a->n_block = blocks(a->n);
+    bool bad = false;
+    SILT_PRAGMA(omp parallel for schedule(static) num_threads(silt_threads(a->n)) reduction(|:bad))
     for (int i = 0; i < a->n; i++) {
-        int k = a->start[i];
-        while (a->index[k] != i)
-            k++;
-        a->diagonal[i] = k;
-        if (!(value[k] > 0) || !isfinite(value[k]))
-            return false;
-        a->inverse[i] = (float)(1 / value[k]);
-        a->value[k] = 0;
+        int own = a->start[i];
+        for (int k = a->start[i]; k < a->start[i + 1]; k++) {
+            a->value[k] = (float)value[k];
+            own = a->index[k] == i ? k : own;
+        }
+        a->diagonal[i] = own;
+        bad |= !(value[own] > 0) || !isfinite(value[own]);
+        a->inverse[i] = (float)(1 / value[own]);
+        a->value[own] = 0;
     }
-    return true;
+    return !bad;
 }
 
 static bool strong(const silt_coarse *c, const double *value, int i, int j, int k) {
@@ -190,31 +216,30 @@ static product multiply(silt_coarse *c, const silt_level *a, const double *value
     return q;
 }
 
-// the prolongation by columns: where each aggregate's entries stand, and in which row
-static void transpose(const silt_level *a, int *start, int *row, int *entry) {
-    for (int m = 0; m < a->to_start[a->n]; m++)
-        start[a->to[m] + 1]++;
+// the prolongation by columns
+static void transpose(silt_level *a) {
+    const int filled = a->to_start[a->n];
+    SILT_RESERVE(a->from_start, a->from_start_capacity, a->n_coarse + 2);
+    SILT_RESERVE(a->from, a->from_capacity, filled + 1);
+    SILT_RESERVE(a->share, a->share_capacity, filled + 1);
+    int *start = a->from_start;
+    memset(start, 0, ((size_t)a->n_coarse + 2) * sizeof *start);
+    for (int m = 0; m < filled; m++)
+        start[a->to[m] + 2]++;
     for (int g = 0; g < a->n_coarse; g++)
-        start[g + 1] += start[g];
-    for (int i = a->n - 1; i >= 0; i--)
+        start[g + 2] += start[g + 1];
+    for (int i = 0; i < a->n; i++)
         for (int m = a->to_start[i]; m < a->to_start[i + 1]; m++) {
-            const int at = --start[a->to[m] + 1];
-            row[at] = i;
-            entry[at] = m;
+            const int at = start[a->to[m] + 1]++;
+            a->from[at] = i;
+            a->share[at] = a->weight[m];
         }
-    // start[g + 1] is now where g begins
-    memmove(start, start + 1, (size_t)a->n_coarse * sizeof *start);
-    start[a->n_coarse] = a->to_start[a->n];
 }
 
 // coarse matrix = prolongation^T matrix prolongation, columns rising
-static void galerkin(silt_coarse *c, const silt_level *a, const double *value, silt_level *b) {
-    const int filled_to = a->to_start[a->n];
+static void galerkin(silt_coarse *c, silt_level *a, const double *value, silt_level *b) {
     product q = multiply(c, a, value);
-    int *start = silt_alloc((size_t)a->n_coarse + 2, sizeof *start),
-        *row = silt_alloc((size_t)filled_to + 1, sizeof *row),
-        *entry = silt_alloc((size_t)filled_to + 1, sizeof *entry);
-    transpose(a, start, row, entry);
+    transpose(a);
     b->n = a->n_coarse;
     SILT_RESERVE(b->own_start, b->start_capacity, b->n + 1);
     SILT_RESERVE(c->row, c->row_capacity, b->n + 1);
@@ -224,8 +249,8 @@ static void galerkin(silt_coarse *c, const silt_level *a, const double *value, s
     for (int g = 0; g < b->n; g++) {
         const int first = filled;
         b->own_start[g] = first;
-        for (int t = start[g]; t < start[g + 1]; t++) {
-            const int i = row[t];
+        for (int t = a->from_start[g]; t < a->from_start[g + 1]; t++) {
+            const int i = a->from[t];
             SILT_RESERVE(b->own_index, b->index_capacity, filled + q.start[i + 1] - q.start[i] + 1);
             for (int k = q.start[i]; k < q.start[i + 1]; k++) {
                 const int h = q.index[k];
@@ -237,7 +262,7 @@ static void galerkin(silt_coarse *c, const silt_level *a, const double *value, s
                         b->own_index[at] = b->own_index[at - 1];
                     b->own_index[at] = h;
                 }
-                c->row[h] += a->weight[entry[t]] * q.value[k];
+                c->row[h] += a->share[t] * q.value[k];
             }
         }
         SILT_RESERVE(b->exact, b->exact_capacity, filled + 1);
@@ -250,9 +275,6 @@ static void galerkin(silt_coarse *c, const silt_level *a, const double *value, s
     free(q.start);
     free(q.index);
     free(q.value);
-    free(start);
-    free(row);
-    free(entry);
 }
 
 static bool factor_coarsest(silt_coarse *c, const silt_level *a, const double *value) {
@@ -297,35 +319,74 @@ bool silt_coarse_build(silt_coarse **coarse, int n, const int *start, const int 
     }
 }
 
-// forward Gauss-Seidel from nought, and what it leaves, carried to the coarser level
-static void go_down(const silt_level *a, float *coarse) {
-    for (int i = 0; i < a->n; i++) {
+// forward Gauss-Seidel from nought on the rows of a block
+static void sweep_down(const silt_level *a, int block) {
+    const int first = block_first(a, block), last = block_first(a, block + 1);
+    for (int i = first; i < last; i++) {
         float sum = a->right[i];
-        for (int k = a->start[i]; k < a->diagonal[i]; k++)
+        int k = a->start[i];
+        while (a->index[k] < first)
+            k++;
+        for (; k < a->diagonal[i]; k++)
             sum -= a->value[k] * a->x[a->index[k]];
         a->x[i] = sum * a->inverse[i];
-    }
-    memset(coarse, 0, (size_t)a->n_coarse * sizeof *coarse);
-    for (int i = 0; i < a->n; i++) {
-        float left = 0;
-        for (int k = a->diagonal[i] + 1; k < a->start[i + 1]; k++)
-            left -= a->value[k] * a->x[a->index[k]];
-        for (int m = a->to_start[i]; m < a->to_start[i + 1]; m++)
-            coarse[a->to[m]] += a->weight[m] * left;
     }
 }
 
-// the coarser level's correction, then backward Gauss-Seidel
-static void go_up(const silt_level *a, const float *coarse) {
-    for (int i = 0; i < a->n; i++)
-        for (int m = a->to_start[i]; m < a->to_start[i + 1]; m++)
-            a->x[i] += a->weight[m] * coarse[a->to[m]];
-    for (int i = a->n - 1; i >= 0; i--) {
+// what it leaves, carried to the coarser level
+static void go_down(const silt_level *a, float *coarse) {
+    SILT_PARALLEL(a->n)
+    for (int block = 0; block < a->n_block; block++)
+        sweep_down(a, block);
+    SILT_PARALLEL(a->n)
+    for (int block = 0; block < a->n_block; block++) {
+        const int first = block_first(a, block), last = block_first(a, block + 1);
+        for (int i = first; i < last; i++) {
+            float left = 0;
+            for (int k = a->start[i]; a->index[k] < first; k++)
+                left -= a->value[k] * a->x[a->index[k]];
+            for (int k = a->diagonal[i] + 1; k < a->start[i + 1]; k++)
+                left -= a->value[k] * a->x[a->index[k]];
+            a->kept[i] = left;
+        }
+    }
+    SILT_PARALLEL(a->n)
+    for (int g = 0; g < a->n_coarse; g++) {
+        float sum = 0;
+        for (int t = a->from_start[g]; t < a->from_start[g + 1]; t++)
+            sum += a->share[t] * a->kept[a->from[t]];
+        coarse[g] = sum;
+    }
+}
+
+// backward Gauss-Seidel on the rows of a block
+static void sweep_up(const silt_level *a, int block) {
+    const int first = block_first(a, block), last = block_first(a, block + 1);
+    for (int i = last - 1; i >= first; i--) {
         float sum = a->right[i];
-        for (int k = a->start[i]; k < a->start[i + 1]; k++)
+        int k = a->start[i], end = a->start[i + 1];
+        for (; a->index[k] < first; k++)
+            sum -= a->value[k] * a->kept[a->index[k]];
+        for (; a->index[end - 1] >= last; end--)
+            sum -= a->value[end - 1] * a->kept[a->index[end - 1]];
+        for (; k < end; k++)
             sum -= a->value[k] * a->x[a->index[k]];
         a->x[i] = sum * a->inverse[i];
     }
+}
+
+// the coarser level's correction, then the sweep
+static void go_up(const silt_level *a, const float *coarse) {
+    SILT_PARALLEL(a->n)
+    for (int i = 0; i < a->n; i++) {
+        float sum = a->x[i];
+        for (int m = a->to_start[i]; m < a->to_start[i + 1]; m++)
+            sum += a->weight[m] * coarse[a->to[m]];
+        a->x[i] = a->kept[i] = sum;
+    }
+    SILT_PARALLEL(a->n)
+    for (int block = 0; block < a->n_block; block++)
+        sweep_up(a, block);
 }
 
 float *silt_coarse_right(silt_coarse *c) {
