@@ -16,10 +16,14 @@
 #define CHUNK_LENGTH 1024   // items in a chunk of a sum, at least
 #define CHUNK_MOST 256
 
-/** threads for a loop over n items: as many as were asked for (--threads, OMP_NUM_THREADS) and are worth it */
+/** From now on loops may take n threads; 0: as many as OMP_NUM_THREADS or the machine says. OpenMP's own number stays at one: that is
+ * BLAS', whose results hang on it. */
+void silt_threads_ask(int n);
+int silt_threads_asked(void);
+/** threads for a loop over n items: as many as were asked for and are worth it */
 static inline int silt_threads(int n) {
-    const int asked = omp_get_max_threads(), worth = n / (PARALLEL_LEAST / 2), most = asked < worth ? asked : worth;
-    return n < PARALLEL_LEAST || most < 1 ? 1 : most < PARALLEL_MOST ? most : PARALLEL_MOST;
+    const int asked = n < PARALLEL_LEAST ? 1 : silt_threads_asked(), worth = n / (PARALLEL_LEAST / 2);
+    return asked < worth || worth < 1 ? asked : worth;
 }
 
 #define SILT_PRAGMA(text) _Pragma(#text)

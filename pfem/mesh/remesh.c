@@ -643,6 +643,20 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
     return largest;
 }
 
+// New numbers where the present ones lie across each other; the mesh's cells still have those before map.
+static void nodes_arrange(const silt_mesh *mesh, silt_nodes *nodes, double h, int n_before, int *map) {
+    int *order = silt_alloc((size_t)nodes->count + 1, sizeof *order), *number = silt_alloc((size_t)nodes->count + 1, sizeof *number);
+    if (silt_nodes_order(mesh, map, nodes, h, order)) {
+        silt_nodes_arrange(nodes, order);
+        for (int k = 0; k < nodes->count; k++)
+            number[order[k]] = k;
+        for (int i = 0; i < n_before; i++)
+            map[i] = map[i] < 0 ? -1 : number[map[i]];
+    }
+    free(order);
+    free(number);
+}
+
 silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
                               silt_memory *memory, int *map, silt_error *err) {
     silt_memory_extend(memory, nodes->count);
@@ -693,7 +707,9 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
     free(sliver);
     draft_clear(&draft);
 
+    const int n_before = nodes->count;
     silt_nodes_compact(nodes, memory->dead, map);
+    nodes_arrange(mesh, nodes, scene->fluid.size, n_before, map);
     silt_delaunay_renumber(memory->kept, map, nodes->count);
     for (int e = 0; e < mesh->n_cell; e++)
         for (int a = 0; a <= dim; a++)

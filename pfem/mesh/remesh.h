@@ -44,6 +44,12 @@ void silt_cell_set_clear(silt_cell_set *set);
  * @param sorted  out, n; a triangle's fourth node is -1 */
 void silt_cells_sort(int n_node, int n_corner, int n, int *node, int (*sorted)[4]);
 
+/** The order in which nodes near in space are near in number too, where it pays: many nodes, whose numbers are mixed by now. It hangs on
+ * positions and numbers alone, so that a resumed run does the same.
+ * @param map    the nodes' numbers from those in the mesh's cells
+ * @param order  out, n: the node that is to be the k-th. @return whether it pays */
+bool silt_nodes_order(const silt_mesh *mesh, const int *map, const silt_nodes *nodes, double h, int *order);
+
 /** a cell's measures */
 typedef struct silt_cell_shape {
     double volume; // m2 or m3

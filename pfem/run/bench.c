@@ -2,7 +2,6 @@
 #include <dirent.h>
 #include <errno.h>
 #include <malloc.h>
-#include <omp.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -10,6 +9,7 @@
 
 #include "bench.h"
 #include "delaunay.h"
+#include "parallel.h"
 
 #define BENCH_STEPS 9
 #define BENCH_WARM_UP 6
@@ -117,7 +117,7 @@ static double mean(int n, const sample *s, size_t offset) {
 static silt_status pair_measure(silt_run *run, const bench_row *row, int k, sample *one, sample *all, silt_error *err) {
     for (int turn = 0; turn < 2; turn++) {
         const bool alone = turn == k % 2;
-        omp_set_num_threads(alone ? 1 : row->threads);
+        silt_threads_ask(alone ? 1 : row->threads);
         SILT_TRY(step_measure(run, alone ? one : all, err));
     }
     return SILT_OK;
