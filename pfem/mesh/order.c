@@ -24,45 +24,32 @@ static bool nodes_mixed(const silt_mesh *mesh, const int *map, int n) {
     return wide > ORDER_SHARE * seen;
 }
 
-// sorts an order of the nodes by their place along an axis, in pieces of h; equal ones stay as they are
-static void sort_along(const silt_nodes *nodes, int axis, double low, double h, int pieces, int *order, int *spare) {
-    const int dim = silt_nodes_dim(nodes), n = nodes->count;
-    int *start = silt_alloc((size_t)pieces + 1, sizeof *start);
-    for (int i = 0; i < n; i++)
-        start[(int)silt_clamp((nodes->x[dim * i + axis] - low) / h, 0, pieces - 1) + 1]++;
-    for (int k = 0; k < pieces; k++)
-        start[k + 1] += start[k];
-    for (int k = 0; k < n; k++)
-        spare[start[(int)silt_clamp((nodes->x[dim * order[k] + axis] - low) / h, 0, pieces - 1)]++] = order[k];
-    memcpy(order, spare, (size_t)n * sizeof *order);
-    free(start);
-}
-
 bool silt_nodes_order(const silt_mesh *mesh, const int *map, const silt_nodes *nodes, double h, int *order) {
     const int dim = silt_nodes_dim(nodes), n = nodes->count;
     if (n < PARALLEL_LEAST || !nodes_mixed(mesh, map, n))
         return false;
     double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-    int axis[3] = {0, 1, 2}, *spare = silt_alloc((size_t)n + 1, sizeof *spare);
-    for (int i = 0; i < n; i++) {
-        order[i] = i;
+    for (int i = 0; i < n; i++)
         for (int d = 0; d < dim; d++) {
             low[d] = silt_min(low[d], nodes->x[dim * i + d]);
             high[d] = silt_max(high[d], nodes->x[dim * i + d]);
         }
+    // slabs across the longest way; in them the nodes stay in their order
+    int axis = 0;
+    for (int d = 1; d < dim; d++)
+        axis = high[d] - low[d] > high[axis] - low[axis] ? d : axis;
+    const int count = (int)silt_clamp((high[axis] - low[axis]) / h + 1, 1, n);
+    int *start = silt_alloc((size_t)count + 1, sizeof *start), *slab = silt_alloc((size_t)n + 1, sizeof *slab);
+    for (int i = 0; i < n; i++) {
+        slab[i] = (int)silt_clamp((nodes->x[dim * i + axis] - low[axis]) / h, 0, count - 1);
+        start[slab[i] + 1]++;
     }
-    // slabs across the longest way, in them rows, and in those nodes along the shortest: sorted by the last first
-    for (int a = 1; a < dim; a++)
-        for (int b = a; b > 0 && high[axis[b]] - low[axis[b]] < high[axis[b - 1]] - low[axis[b - 1]]; b--) {
-            const int t = axis[b];
-            axis[b] = axis[b - 1];
-            axis[b - 1] = t;
-        }
-    for (int a = 0; a < dim; a++) {
-        const double extent = high[axis[a]] - low[axis[a]];
-        sort_along(nodes, axis[a], low[axis[a]], h, (int)silt_clamp(extent / h + 1, 1, n), order, spare);
-    }
-    free(spare);
+    for (int k = 0; k < count; k++)
+        start[k + 1] += start[k];
+    for (int i = 0; i < n; i++)
+        order[start[slab[i]]++] = i;
+    free(start);
+    free(slab);
     return true;
 }
 
