@@ -30,14 +30,27 @@ typedef struct silt_level {
         kept_capacity;
 } silt_level;
 
+/** rows of a sparse matrix while they are made, some of them by each thread */
+typedef struct silt_piece {
+    int *index;    // owned
+    double *value; // owned
+    int filled;
+    int *mark;     // owned, per column: where it stands in the row at hand, or less than that row's first
+    double *row;   // owned, per column
+    int index_capacity, value_capacity, mark_capacity, row_capacity;
+} silt_piece;
+
 struct silt_coarse {
     int n_level;
     silt_level level[COARSE_LEVELS];
     silt_factor factor; // owned, of the coarsest level
     double *work;       // owned, for its solution
     int *group, *mark;  // owned, aggregates of the level at hand
-    double *strongest, *row;
-    int work_capacity, group_capacity, mark_capacity, strongest_capacity, row_capacity;
+    double *strongest;
+    silt_piece piece[PARALLEL_MOST];
+    int *product_start, *product_index; // owned, rows of matrix times prolongation
+    double *product;                    // owned
+    int work_capacity, group_capacity, mark_capacity, strongest_capacity, product_start_capacity, product_index_capacity, product_capacity;
 };
 
 void silt_coarse_free(silt_coarse **coarse) {
@@ -67,7 +80,15 @@ void silt_coarse_free(silt_coarse **coarse) {
     free(c->group);
     free(c->mark);
     free(c->strongest);
-    free(c->row);
+    free(c->product_start);
+    free(c->product_index);
+    free(c->product);
+    for (int part = 0; part < PARALLEL_MOST; part++) {
+        free(c->piece[part].index);
+        free(c->piece[part].value);
+        free(c->piece[part].mark);
+        free(c->piece[part].row);
+    }
     free(c);
     *coarse = NULL;
 }
@@ -117,6 +138,7 @@ static bool strong(const silt_coarse *c, const double *value, int i, int j, int 
 // taken. Nodes without strong neighbours have no aggregate: the sweeps solve them. @return how many
 static int aggregate(silt_coarse *c, const silt_level *a, const double *value) {
     int count = 0;
+    SILT_PARALLEL(a->n)
     for (int i = 0; i < a->n; i++) {
         c->strongest[i] = 0;
         c->group[i] = -1;
@@ -139,6 +161,7 @@ static int aggregate(silt_coarse *c, const silt_level *a, const double *value) {
         c->group[i] = count++;
     }
     memcpy(c->mark, c->group, (size_t)a->n * sizeof *c->mark);
+    SILT_PARALLEL(a->n)
     for (int i = 0; i < a->n; i++) {
         double most = 0;
         for (int k = a->start[i]; k < a->start[i + 1] && c->mark[i] < 0; k++)
@@ -150,70 +173,115 @@ static int aggregate(silt_coarse *c, const silt_level *a, const double *value) {
     return count;
 }
 
+// ---- sparse matrices row by row, some rows by each thread: the pieces are joined in their order
+
+static void piece_begin(silt_piece *p, int n_column) {
+    SILT_RESERVE(p->mark, p->mark_capacity, n_column + 1);
+    for (int g = 0; g < n_column; g++)
+        p->mark[g] = -1;
+    p->filled = 0;
+}
+
+static void piece_room(silt_piece *p, int more) {
+    SILT_RESERVE(p->index, p->index_capacity, p->filled + more);
+    SILT_RESERVE(p->value, p->value_capacity, p->filled + more);
+}
+
+// adds to a column of the row that begins at `row`
+static inline void piece_add(silt_piece *p, int row, int column, double value) {
+    if (p->mark[column] < row) {
+        p->mark[column] = p->filled;
+        p->index[p->filled] = column;
+        p->value[p->filled++] = 0;
+    }
+    p->value[p->mark[column]] += value;
+}
+
+static int part_first(int n, int part) { return (int)((int64_t)n * part / silt_threads(n)); }
+
+// where rows begin, counted from the first of all; they were counted from the first of their piece. @return how many entries
+static int pieces_count(const silt_piece *piece, int n, int *start) {
+    int filled = 0;
+    for (int part = 0; part < silt_threads(n); part++) {
+        for (int i = part_first(n, part); i < part_first(n, part + 1); i++)
+            start[i] += filled;
+        filled += piece[part].filled;
+    }
+    start[n] = filled;
+    return filled;
+}
+
 // Rows of the prolongation: the aggregates' indicator, smoothed by a step of Jacobi on the matrix whose weak entries
 // are lumped onto the diagonal
-static void prolongation(silt_coarse *c, silt_level *a, const double *value) {
-    SILT_RESERVE(a->to_start, a->to_start_capacity, a->n + 1);
-    for (int g = 0; g < a->n_coarse; g++)
-        c->mark[g] = -1;
-    int filled = 0;
-    for (int i = 0; i < a->n; i++) {
-        const int first = a->start[i], last = a->start[i + 1];
-        SILT_RESERVE(a->to, a->to_capacity, filled + last - first + 1);
-        SILT_RESERVE(a->weight, a->weight_capacity, filled + last - first + 1);
-        a->to_start[i] = filled;
+static void prolongation_rows(silt_coarse *c, silt_level *a, const double *value, int part) {
+    silt_piece *p = &c->piece[part];
+    piece_begin(p, a->n_coarse);
+    for (int i = part_first(a->n, part); i < part_first(a->n, part + 1); i++) {
+        const int first = a->start[i], last = a->start[i + 1], row = p->filled;
+        piece_room(p, last - first + 1);
+        a->to_start[i] = row;
         double own = 0, others = 0;
         for (int k = first; k < last; k++)
             *(strong(c, value, i, a->index[k], k) ? &others : &own) += value[k];
         const double step = own > 0 ? COARSE_OMEGA / (1 - others / own) : 0;
-        const int row = filled;
-        for (int k = first; k < last; k++) {
+        for (int k = first; k < last && c->group[i] >= 0; k++) {
             const int j = a->index[k], g = c->group[j];
             const double w = j == i ? 1 - step : step > 0 && strong(c, value, i, j, k) ? -step * value[k] / own : 0;
-            if (g < 0 || w == 0 || c->group[i] < 0)
-                continue;
-            if (c->mark[g] < row) {
-                c->mark[g] = filled;
-                a->to[filled] = g;
-                a->weight[filled++] = 0;
-            }
-            a->weight[c->mark[g]] += (float)w;
+            if (g >= 0 && w != 0)
+                piece_add(p, row, g, w);
         }
     }
-    a->to_start[a->n] = filled;
+}
+
+static void prolongation(silt_coarse *c, silt_level *a, const double *value) {
+    SILT_RESERVE(a->to_start, a->to_start_capacity, a->n + 1);
+    SILT_PARALLEL(a->n)
+    for (int part = 0; part < silt_threads(a->n); part++)
+        prolongation_rows(c, a, value, part);
+    const int filled = pieces_count(c->piece, a->n, a->to_start);
+    SILT_RESERVE(a->to, a->to_capacity, filled + 1);
+    SILT_RESERVE(a->weight, a->weight_capacity, filled + 1);
+    SILT_PARALLEL(a->n)
+    for (int part = 0; part < silt_threads(a->n); part++) {
+        const int first = a->to_start[part_first(a->n, part)];
+        for (int m = 0; m < c->piece[part].filled; m++) {
+            a->to[first + m] = c->piece[part].index[m];
+            a->weight[first + m] = (float)c->piece[part].value[m];
+        }
+    }
 }
 
 // rows of matrix times prolongation
-typedef struct product {
-    int *start, *index;
-    double *value;
-} product;
-
-static product multiply(silt_coarse *c, const silt_level *a, const double *value) {
-    int capacity = 0, value_capacity = 0, filled = 0;
-    product q = {silt_alloc((size_t)a->n + 1, sizeof *q.start), NULL, NULL};
-    for (int g = 0; g < a->n_coarse; g++)
-        c->mark[g] = -1;
-    for (int i = 0; i < a->n; i++) {
-        const int row = filled;
-        q.start[i] = row;
+static void multiply_rows(silt_coarse *c, const silt_level *a, const double *value, int part) {
+    silt_piece *p = &c->piece[part];
+    piece_begin(p, a->n_coarse);
+    for (int i = part_first(a->n, part); i < part_first(a->n, part + 1); i++) {
+        const int row = p->filled;
+        c->product_start[i] = row;
         for (int k = a->start[i]; k < a->start[i + 1]; k++) {
-            const int j = a->index[k], more = a->to_start[j + 1] - a->to_start[j];
-            SILT_RESERVE(q.index, capacity, filled + more + 1);
-            SILT_RESERVE(q.value, value_capacity, filled + more + 1);
-            for (int m = a->to_start[j]; m < a->to_start[j + 1]; m++) {
-                const int g = a->to[m];
-                if (c->mark[g] < row) {
-                    c->mark[g] = filled;
-                    q.index[filled] = g;
-                    q.value[filled++] = 0;
-                }
-                q.value[c->mark[g]] += value[k] * a->weight[m];
-            }
+            const int j = a->index[k];
+            piece_room(p, a->to_start[j + 1] - a->to_start[j]);
+            for (int m = a->to_start[j]; m < a->to_start[j + 1]; m++)
+                piece_add(p, row, a->to[m], value[k] * a->weight[m]);
         }
     }
-    q.start[a->n] = filled;
-    return q;
+}
+
+static void multiply(silt_coarse *c, const silt_level *a, const double *value) {
+    SILT_RESERVE(c->product_start, c->product_start_capacity, a->n + 1);
+    SILT_PARALLEL(a->n)
+    for (int part = 0; part < silt_threads(a->n); part++)
+        multiply_rows(c, a, value, part);
+    const int filled = pieces_count(c->piece, a->n, c->product_start);
+    SILT_RESERVE(c->product_index, c->product_index_capacity, filled + 1);
+    SILT_RESERVE(c->product, c->product_capacity, filled + 1);
+    SILT_PARALLEL(a->n)
+    for (int part = 0; part < silt_threads(a->n); part++) {
+        const silt_piece *p = &c->piece[part];
+        const int first = c->product_start[part_first(a->n, part)];
+        memcpy(c->product_index + first, p->index, (size_t)p->filled * sizeof *p->index);
+        memcpy(c->product + first, p->value, (size_t)p->filled * sizeof *p->value);
+    }
 }
 
 // the prolongation by columns
@@ -236,45 +304,59 @@ static void transpose(silt_level *a) {
         }
 }
 
-// coarse matrix = prolongation^T matrix prolongation, columns rising
-static void galerkin(silt_coarse *c, silt_level *a, const double *value, silt_level *b) {
-    product q = multiply(c, a, value);
-    transpose(a);
-    b->n = a->n_coarse;
-    SILT_RESERVE(b->own_start, b->start_capacity, b->n + 1);
-    SILT_RESERVE(c->row, c->row_capacity, b->n + 1);
-    for (int g = 0; g < b->n; g++)
-        c->mark[g] = -1;
-    int filled = 0;
-    for (int g = 0; g < b->n; g++) {
-        const int first = filled;
+// Coarse matrix = prolongation^T matrix prolongation, columns rising. Few rows, each from many of the finer level, so that the
+// finer level tells how many threads they are worth.
+static void galerkin_rows(silt_coarse *c, const silt_level *a, silt_level *b, int part, int n_part) {
+    silt_piece *p = &c->piece[part];
+    piece_begin(p, b->n);
+    SILT_RESERVE(p->row, p->row_capacity, b->n + 1);
+    for (int g = (int)((int64_t)b->n * part / n_part); g < (int)((int64_t)b->n * (part + 1) / n_part); g++) {
+        const int first = p->filled;
         b->own_start[g] = first;
         for (int t = a->from_start[g]; t < a->from_start[g + 1]; t++) {
             const int i = a->from[t];
-            SILT_RESERVE(b->own_index, b->index_capacity, filled + q.start[i + 1] - q.start[i] + 1);
-            for (int k = q.start[i]; k < q.start[i + 1]; k++) {
-                const int h = q.index[k];
-                if (c->mark[h] != g) {
-                    c->mark[h] = g;
-                    c->row[h] = 0;
-                    int at = filled++; // insertion: rows are short
-                    for (; at > first && b->own_index[at - 1] > h; at--)
-                        b->own_index[at] = b->own_index[at - 1];
-                    b->own_index[at] = h;
+            piece_room(p, c->product_start[i + 1] - c->product_start[i]);
+            for (int k = c->product_start[i]; k < c->product_start[i + 1]; k++) {
+                const int h = c->product_index[k];
+                if (p->mark[h] != g) {
+                    p->mark[h] = g;
+                    p->row[h] = 0;
+                    int at = p->filled++; // insertion: rows are short
+                    for (; at > first && p->index[at - 1] > h; at--)
+                        p->index[at] = p->index[at - 1];
+                    p->index[at] = h;
                 }
-                c->row[h] += a->share[t] * q.value[k];
+                p->row[h] += a->share[t] * c->product[k];
             }
         }
-        SILT_RESERVE(b->exact, b->exact_capacity, filled + 1);
-        for (int k = first; k < filled; k++)
-            b->exact[k] = c->row[b->own_index[k]];
+        for (int k = first; k < p->filled; k++)
+            p->value[k] = p->row[p->index[k]];
+    }
+}
+
+static void galerkin(silt_coarse *c, silt_level *a, const double *value, silt_level *b) {
+    multiply(c, a, value);
+    transpose(a);
+    b->n = a->n_coarse;
+    SILT_RESERVE(b->own_start, b->start_capacity, b->n + 1);
+    const int n_part = silt_threads(a->n);
+    SILT_PARALLEL(a->n)
+    for (int part = 0; part < n_part; part++)
+        galerkin_rows(c, a, b, part, n_part);
+    int filled = 0;
+    for (int part = 0; part < n_part; part++) {
+        const silt_piece *p = &c->piece[part];
+        SILT_RESERVE(b->own_index, b->index_capacity, filled + p->filled + 1);
+        SILT_RESERVE(b->exact, b->exact_capacity, filled + p->filled + 1);
+        memcpy(b->own_index + filled, p->index, (size_t)p->filled * sizeof *p->index);
+        memcpy(b->exact + filled, p->value, (size_t)p->filled * sizeof *p->value);
+        for (int g = (int)((int64_t)b->n * part / n_part); g < (int)((int64_t)b->n * (part + 1) / n_part); g++)
+            b->own_start[g] += filled;
+        filled += p->filled;
     }
     b->own_start[b->n] = filled;
     b->start = b->own_start;
     b->index = b->own_index;
-    free(q.start);
-    free(q.index);
-    free(q.value);
 }
 
 static bool factor_coarsest(silt_coarse *c, const silt_level *a, const double *value) {
