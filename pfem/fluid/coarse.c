@@ -203,7 +203,7 @@ static int part_first(int n, int part) { return (int)((int64_t)n * part / silt_t
 static int pieces_count(const silt_piece *piece, int n, int *start) {
     int filled = 0;
     for (int part = 0; part < silt_threads(n); part++) {
-        for (int i = part_first(n, part); i < part_first(n, part + 1); i++)
+        for (int i = part_first(n, part), end = part_first(n, part + 1); i < end; i++)
             start[i] += filled;
         filled += piece[part].filled;
     }
@@ -216,7 +216,7 @@ static int pieces_count(const silt_piece *piece, int n, int *start) {
 static void prolongation_rows(silt_coarse *c, silt_level *a, const double *value, int part) {
     silt_piece *p = &c->piece[part];
     piece_begin(p, a->n_coarse);
-    for (int i = part_first(a->n, part); i < part_first(a->n, part + 1); i++) {
+    for (int i = part_first(a->n, part), end = part_first(a->n, part + 1); i < end; i++) {
         const int first = a->start[i], last = a->start[i + 1], row = p->filled;
         piece_room(p, last - first + 1);
         a->to_start[i] = row;
@@ -255,7 +255,7 @@ static void prolongation(silt_coarse *c, silt_level *a, const double *value) {
 static void multiply_rows(silt_coarse *c, const silt_level *a, const double *value, int part) {
     silt_piece *p = &c->piece[part];
     piece_begin(p, a->n_coarse);
-    for (int i = part_first(a->n, part); i < part_first(a->n, part + 1); i++) {
+    for (int i = part_first(a->n, part), end = part_first(a->n, part + 1); i < end; i++) {
         const int row = p->filled;
         c->product_start[i] = row;
         for (int k = a->start[i]; k < a->start[i + 1]; k++) {
@@ -310,7 +310,7 @@ static void galerkin_rows(silt_coarse *c, const silt_level *a, silt_level *b, in
     silt_piece *p = &c->piece[part];
     piece_begin(p, b->n);
     SILT_RESERVE(p->row, p->row_capacity, b->n + 1);
-    for (int g = (int)((int64_t)b->n * part / n_part); g < (int)((int64_t)b->n * (part + 1) / n_part); g++) {
+    for (int g = (int)((int64_t)b->n * part / n_part), end = (int)((int64_t)b->n * (part + 1) / n_part); g < end; g++) {
         const int first = p->filled;
         b->own_start[g] = first;
         for (int t = a->from_start[g]; t < a->from_start[g + 1]; t++) {
