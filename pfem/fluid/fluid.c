@@ -144,14 +144,17 @@ static void find_excess(silt_fluid *f, const silt_step *s, double stiff, const d
     memset(f->excess, 0, (size_t)(D * f->n_node) * sizeof(double));
     if (s->drag)
         return;
+    SILT_PARALLEL(f->n_node)
     for (int k = 0; k < D * f->n_node; k++)
         a[k] = right[k];
+    SILT_PARALLEL(f->n_node)
     for (int i = 0; i < f->n_node; i++)
         for (int d = 0; d < D; d++)
             a[D * i + d] -= f->mass[i] * v[D * i + d] / theta_dt + (f->inertia[i] - f->mass[i] / theta_dt) * f->w[D * i + d];
     if (stiff > 0 && stiff < 0.1)
         for (int k = 0; k < D * f->n_node; k++)
             a[k] += (stiff / 0.1 - 1) * f->scratch[k];
+    SILT_PARALLEL(f->n_node)
     for (int i = 0; i < f->n_node; i++) {
         for (int d = 0; d < D; d++)
             a[D * i + d] = s->mesh->wet[i] && f->mass[i] > 0 ? a[D * i + d] / f->mass[i] : 0;
@@ -171,6 +174,7 @@ static void find_excess(silt_fluid *f, const silt_step *s, double stiff, const d
 static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, double *out) {
     const int D = f->dim;
     const double per_time = 1 / (f->theta * s->dt), *v = s->nodes->v, *g = s->scene->gravity;
+    SILT_PARALLEL(f->n_node)
     for (int i = 0; i < f->n_node; i++)
         for (int d = 0; d < D; d++)
             out[D * i + d] = f->mass[i] * (v[D * i + d] * per_time + g[d]) + (s->drag ? s->drag->push[D * i + d] : 0);
@@ -250,6 +254,7 @@ static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid,
     } else {
         for (int k = 0; k < D * f->n_node && viscid; k++)
             f->force[k] -= f->scratch[k];
+        SILT_PARALLEL(f->n_node)
         for (int i = 0; i < f->n_node; i++) {
             const double stand = viscid ? f->stand[i] : 0;
             for (int d = 0; d < D; d++)
@@ -267,17 +272,28 @@ static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid,
 // largest share of its volume that a node would gain or lose in the step. @return that node
 static int worst_residual(silt_fluid *f, const silt_step *s) {
     const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
-    int worst = 0;
-    f->worst = 0;
-    for (int j = 0; j < f->n_node; j++) {
-        if (!s->mesh->wet[j] || (!consistent && s->mesh->surface[j]) || f->mobile[j] != 1)
-            continue;
-        const double share = fabs(f->residual[j]) * s->dt / f->volume[j];
-        if (share > f->worst || !isfinite(share)) {
-            f->worst = share;
-            worst = j;
+    const int n = f->n_node;
+    int node[CHUNK_MOST], worst = 0;
+    double most[CHUNK_MOST];
+    SILT_PARALLEL(n)
+    for (int c = 0; c < silt_chunks(n); c++) {
+        most[c] = node[c] = 0;
+        for (int j = silt_chunk_first(n, c); j < silt_chunk_first(n, c + 1); j++) {
+            if (!s->mesh->wet[j] || (!consistent && s->mesh->surface[j]) || f->mobile[j] != 1)
+                continue;
+            const double share = fabs(f->residual[j]) * s->dt / f->volume[j];
+            if (share > most[c] || !isfinite(share)) {
+                most[c] = share;
+                node[c] = j;
+            }
         }
     }
+    f->worst = 0;
+    for (int c = 0; c < silt_chunks(n); c++)
+        if (most[c] > f->worst || !isfinite(most[c])) {
+            f->worst = most[c];
+            worst = node[c];
+        }
     return worst;
 }
 
@@ -285,6 +301,7 @@ static int worst_residual(silt_fluid *f, const silt_step *s) {
 static int star_continuity(silt_fluid *f, const silt_step *s, const double *p) {
     const double *v = f->star;
     if (f->shift) {
+        SILT_PARALLEL(f->n_node)
         for (int k = 0; k < f->dim * f->n_node; k++)
             f->scratch[k] = f->star[k] + f->shift[k];
         v = f->scratch;
@@ -298,6 +315,7 @@ static void correct(silt_fluid *f, const silt_step *s, const double *q, double *
     const int D = f->dim;
     memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
     silt_assemble_pressure(f, s->mesh, q, f->scratch);
+    SILT_PARALLEL(f->n_node)
     for (int i = 0; i < f->n_node; i++) {
         if (!s->mesh->wet[i])
             continue;
@@ -313,6 +331,7 @@ static void correct(silt_fluid *f, const silt_step *s, const double *q, double *
 // increment = -matrix^-1 residual, in 3-D to `tolerance`, or to what is worth having where the step is solved far
 static silt_status pressure_increment(silt_fluid *f, const silt_step *s, double tolerance, silt_error *err) {
     silt_status status;
+    SILT_PARALLEL(f->n_node)
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
     tolerance = silt_min(tolerance, FLUID_INNER * s->scene->fluid.tolerance);
@@ -590,6 +609,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->w));
         if (refresh)
             find_excess(f, s, stiff, f->force);
+        SILT_PARALLEL(f->n_node)
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
         // on the way the momentum is solved no further than it is worth; the iterate that ends it is solved out
@@ -644,6 +664,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             SILT_TRY(prepare_stiff(f, s, &twofold, err)); // viscosity may have grown since the first iteration
             SILT_TRY(correct_stiff(f, err));
         }
+        SILT_PARALLEL(f->n_node)
         for (int i = 0; i < f->n_node; i++)
             p[i] += f->increment[i];
         if (stiff > FLUID_STIFF || squeezed)

@@ -191,7 +191,7 @@ static void shapes_anywhere(silt_fluid *f, const silt_mesh *mesh, const double *
     SILT_PRAGMA(omp parallel for schedule(static) num_threads(f->parts.n))
     for (int part = 0; part < f->parts.n; part++)
         BY_DIM(shapes_part, f, mesh, x, part);
-    silt_parts_finish(&f->parts, mesh, SUMS(1, NULL, f->volume));
+    silt_parts_finish(&f->parts, SUMS(1, NULL, f->volume));
     f->shaped = true;
 }
 

@@ -21,7 +21,7 @@
         SILT_PRAGMA(omp parallel for schedule(static) num_threads(f->parts.n))                                         \
         for (int part_ = 0; part_ < f->parts.n; part_++)                                                               \
             BY_DIM(CELLS_OF_PART, &f->parts, part_, sums_, kernel, ##__VA_ARGS__);                                     \
-        silt_parts_finish(&f->parts, mesh, sums_);                                                                     \
+        silt_parts_finish(&f->parts, sums_);                                                                     \
     } while (0)
 // the cells between those of the border in a loop of their own, as fast as without parts
 #define CELLS_OF_PART(D, parts, part, sums, kernel, ...)                                                               \

@@ -26,14 +26,15 @@ typedef struct silt_parts {
     int *cell;                      // owned, cells that have a node of an earlier part, rising
     uint8_t *late;                  // owned, per cell: bit a is set where its node a is one of an earlier part
     double *spill;                  // owned, SPILL numbers a border cell
-    int cell_capacity, late_capacity, spill_capacity;
+    int n_late, *node, *place;      // owned, nodes that something is put aside for, rising, in the order of the cells; 4 b + a: where
+    int cell_capacity, late_capacity, spill_capacity, node_capacity, place_capacity;
 } silt_parts;
 
 /** as many parts as threads are worth it for this mesh */
 void silt_parts_make(silt_parts *parts, const silt_mesh *mesh);
 void silt_parts_clear(silt_parts *parts);
 /** adds what was put aside */
-void silt_parts_finish(const silt_parts *parts, const silt_mesh *mesh, silt_sums sums);
+void silt_parts_finish(const silt_parts *parts, silt_sums sums);
 
 /** where a cell's contributions go: to its nodes, or aside */
 typedef struct silt_to {

@@ -21,10 +21,15 @@ void silt_group_join(int *parent, const int *cell) {
 }
 
 double silt_mesh_volume(const silt_mesh *mesh, const double *x) {
-    double sum = 0;
-    for (int e = 0; e < mesh->n_cell; e++)
-        sum += silt_cell_volume(mesh, x, e);
-    return sum;
+    const int n = mesh->n_cell;
+    double part[CHUNK_MOST];
+    SILT_PARALLEL(n)
+    for (int c = 0; c < silt_chunks(n); c++) {
+        part[c] = 0;
+        for (int e = silt_chunk_first(n, c); e < silt_chunk_first(n, c + 1); e++)
+            part[c] += silt_cell_volume(mesh, x, e);
+    }
+    return silt_total(silt_chunks(n), part);
 }
 
 // nodes of the facet opposite each node of a cell; in 2-D water on its left, in 3-D counter-clockwise seen from outside
