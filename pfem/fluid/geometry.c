@@ -188,10 +188,15 @@ KERNEL shapes_part(const int D, silt_fluid *f, const silt_mesh *mesh, const doub
 
 static void shapes_anywhere(silt_fluid *f, const silt_mesh *mesh, const double *x) {
     memset(f->volume, 0, (size_t)f->n_node * sizeof(double));
-    SILT_PRAGMA(omp parallel for schedule(static) num_threads(f->parts.n))
-    for (int part = 0; part < f->parts.n; part++)
-        BY_DIM(shapes_part, f, mesh, x, part);
-    silt_parts_finish(&f->parts, SUMS(1, NULL, f->volume));
+    SILT_PRAGMA(omp parallel num_threads(f->parts.n))
+    {
+        SILT_PRAGMA(omp for schedule(static))
+        for (int part = 0; part < f->parts.n; part++)
+            BY_DIM(shapes_part, f, mesh, x, part);
+        SILT_PRAGMA(omp for schedule(static))
+        for (int part = 0; part < f->parts.n; part++)
+            silt_parts_finish(&f->parts, SUMS(1, NULL, f->volume), part);
+    }
     f->shaped = true;
 }
 

@@ -18,10 +18,15 @@
 #define BY_CELL(target, kernel, ...)                                                                                   \
     do {                                                                                                               \
         const silt_sums sums_ = target;                                                                                \
-        SILT_PRAGMA(omp parallel for schedule(static) num_threads(f->parts.n))                                         \
-        for (int part_ = 0; part_ < f->parts.n; part_++)                                                               \
-            BY_DIM(CELLS_OF_PART, &f->parts, part_, sums_, kernel, ##__VA_ARGS__);                                     \
-        silt_parts_finish(&f->parts, sums_);                                                                     \
+        SILT_PRAGMA(omp parallel num_threads(f->parts.n))                                                              \
+        {                                                                                                              \
+            SILT_PRAGMA(omp for schedule(static))                                                                      \
+            for (int part_ = 0; part_ < f->parts.n; part_++)                                                           \
+                BY_DIM(CELLS_OF_PART, &f->parts, part_, sums_, kernel, ##__VA_ARGS__);                                 \
+            SILT_PRAGMA(omp for schedule(static))                                                                      \
+            for (int part_ = 0; part_ < f->parts.n; part_++)                                                           \
+                silt_parts_finish(&f->parts, sums_, part_);                                                            \
+        }                                                                                                              \
     } while (0)
 // the cells between those of the border in a loop of their own, as fast as without parts
 #define CELLS_OF_PART(D, parts, part, sums, kernel, ...)                                                               \

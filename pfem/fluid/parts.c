@@ -75,6 +75,12 @@ void silt_parts_make(silt_parts *p, const silt_mesh *mesh) {
     p->border[p->n] = count;
     SILT_RESERVE(p->spill, p->spill_capacity, SPILL * count + 1);
     p->n_late = n_late;
+    for (int part = 0; part <= p->n; part++) { // no node is cut
+        int k = (int)((int64_t)n_late * part / p->n);
+        while (k > 0 && k < n_late && p->node[k] == p->node[k - 1])
+            k++;
+        p->split[part] = k;
+    }
     for (int k = 0; k < n_late; k++)
         p->place[k] = 4 * border_number(p, p->place[k] / 4) + p->place[k] % 4;
 }
@@ -92,10 +98,10 @@ void silt_parts_settle(const silt_parts *p, const silt_mesh *mesh, silt_sums sum
     }
 }
 
-void silt_parts_finish(const silt_parts *p, silt_sums sums) {
-    const int n = p->n > 1 ? p->n_late : 0;
+void silt_parts_finish(const silt_parts *p, silt_sums sums, int part) {
+    const int first = p->n > 1 ? p->split[part] : 0, n = p->n > 1 ? p->split[part + 1] : 0;
     if (sums.wide && sums.width == 3)
-        for (int k = 0; k < n; k++) {
+        for (int k = first; k < n; k++) {
             double *to = sums.wide + 3 * p->node[k];
             const double *from = p->spill + SPILL * (p->place[k] / 4) + 3 * (p->place[k] % 4);
             to[0] += from[0];
@@ -103,9 +109,9 @@ void silt_parts_finish(const silt_parts *p, silt_sums sums) {
             to[2] += from[2];
         }
     else if (sums.wide)
-        for (int k = 0; k < n; k++)
+        for (int k = first; k < n; k++)
             for (int d = 0; d < sums.width; d++)
                 sums.wide[sums.width * p->node[k] + d] += p->spill[SPILL * (p->place[k] / 4) + sums.width * (p->place[k] % 4) + d];
-    for (int k = 0; k < n && sums.one; k++)
+    for (int k = first; k < n && sums.one; k++)
         sums.one[p->node[k]] += p->spill[SPILL * (p->place[k] / 4) + SPILL_SCALAR + p->place[k] % 4];
 }

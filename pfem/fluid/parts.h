@@ -27,14 +27,15 @@ typedef struct silt_parts {
     uint8_t *late;                  // owned, per cell: bit a is set where its node a is one of an earlier part
     double *spill;                  // owned, SPILL numbers a border cell
     int n_late, *node, *place;      // owned, nodes that something is put aside for, rising, in the order of the cells; 4 b + a: where
+    int split[PARALLEL_MOST + 1];   // where each thread begins with these, and n_late
     int cell_capacity, late_capacity, spill_capacity, node_capacity, place_capacity;
 } silt_parts;
 
 /** as many parts as threads are worth it for this mesh */
 void silt_parts_make(silt_parts *parts, const silt_mesh *mesh);
 void silt_parts_clear(silt_parts *parts);
-/** adds what was put aside */
-void silt_parts_finish(const silt_parts *parts, silt_sums sums);
+/** adds what was put aside, for a part of the nodes; after all parts of the cells */
+void silt_parts_finish(const silt_parts *parts, silt_sums sums, int part);
 
 /** where a cell's contributions go: to its nodes, or aside */
 typedef struct silt_to {

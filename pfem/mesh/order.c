@@ -4,7 +4,7 @@
 #include "remesh.h"
 
 #define ORDER_WIDE 4.0   // slabs of nodes, in what a cube would have, that a cell may span
-#define ORDER_SHARE 0.04 // of the cells that may span more
+#define ORDER_SHARE 0.1  // of the cells that may span more
 #define ORDER_EVERY 8    // of the cells that are looked at
 
 // Water that mixes carries its nodes' numbers through each other.
