@@ -53,6 +53,23 @@ struct silt_coarse {
     int work_capacity, group_capacity, mark_capacity, strongest_capacity, product_start_capacity, product_index_capacity, product_capacity;
 };
 
+// what only the making of the levels needs: 7 % of all memory in space
+static void rows_forget(silt_coarse *c) {
+    free(c->product_start);
+    free(c->product_index);
+    free(c->product);
+    c->product_start = c->product_index = NULL;
+    c->product = NULL;
+    c->product_start_capacity = c->product_index_capacity = c->product_capacity = 0;
+    for (int part = 0; part < PARALLEL_MOST; part++) {
+        free(c->piece[part].index);
+        free(c->piece[part].value);
+        free(c->piece[part].mark);
+        free(c->piece[part].row);
+        c->piece[part] = (silt_piece){0};
+    }
+}
+
 void silt_coarse_free(silt_coarse **coarse) {
     if (!*coarse)
         return;
@@ -80,15 +97,7 @@ void silt_coarse_free(silt_coarse **coarse) {
     free(c->group);
     free(c->mark);
     free(c->strongest);
-    free(c->product_start);
-    free(c->product_index);
-    free(c->product);
-    for (int part = 0; part < PARALLEL_MOST; part++) {
-        free(c->piece[part].index);
-        free(c->piece[part].value);
-        free(c->piece[part].mark);
-        free(c->piece[part].row);
-    }
+    rows_forget(c);
     free(c);
     *coarse = NULL;
 }
@@ -377,10 +386,7 @@ static bool factor_coarsest(silt_coarse *c, const silt_level *a, const double *v
     return silt_factor_compute(&c->factor);
 }
 
-bool silt_coarse_build(silt_coarse **coarse, int n, const int *start, const int *index, const double *value) {
-    if (!*coarse)
-        *coarse = silt_alloc(1, sizeof **coarse);
-    silt_coarse *c = *coarse;
+static bool levels_build(silt_coarse *c, int n, const int *start, const int *index, const double *value) {
     SILT_RESERVE(c->group, c->group_capacity, n + 1);
     SILT_RESERVE(c->mark, c->mark_capacity, n + 1);
     SILT_RESERVE(c->strongest, c->strongest_capacity, n + 1);
@@ -399,6 +405,14 @@ bool silt_coarse_build(silt_coarse **coarse, int n, const int *start, const int 
         prolongation(c, a, entry);
         galerkin(c, a, entry, a + 1);
     }
+}
+
+bool silt_coarse_build(silt_coarse **coarse, int n, const int *start, const int *index, const double *value) {
+    if (!*coarse)
+        *coarse = silt_alloc(1, sizeof **coarse);
+    const bool done = levels_build(*coarse, n, start, index, value);
+    rows_forget(*coarse);
+    return done;
 }
 
 // forward Gauss-Seidel from nought on the rows of a block

@@ -39,7 +39,7 @@ static const struct argp_option main_options[] = {
     {"output", 'o', "OUT", 0, "output folder; default: the scene's folder name plus .out in the current folder (bench: JSON file; default: none)", 0},
     {NULL, 'D', "KEY=VALUE", 0, "set a key of the scene, for example fluid.size=0.01 or bodies.temple.density=700", 0},
     {"until", LONG_ONLY(OPTION_UNTIL), "T", 0, "run to this time in s instead of the scene's time.end", 0},
-    {"threads", LONG_ONLY(OPTION_THREADS), "N", 0, "threads; default: all (bench: one)", 0},
+    {"threads", LONG_ONLY(OPTION_THREADS), "N", 0, "threads; default: all, or OMP_NUM_THREADS; the results are the same bits (bench: one; with more, every other step is done on one)", 0},
     {"quiet", 'q', NULL, 0, "no progress line", 0},
     {"force", LONG_ONLY(OPTION_FORCE), NULL, 0, "replace an output folder that is there", 0},
     {"worker", LONG_ONLY('w'), "PATH", OPTION_HIDDEN, "the silt-dem program", 0},
