@@ -30,26 +30,27 @@ struct silt_front {
     int *first;             // owned, of each star, the lowest place
     int *local;             // owned, per place: row in the front; in the dissection: part
     struct item *item;      // owned
-    double *value;          // owned, panels, columns one after the other, 1/diagonal in the diagonal's place
-    double *stack[2];       // owned, updates that wait for their parent
-    double *right;          // owned, in the order of elimination
-    double **column;        // owned, of the present front
+    float *value;           // owned, panels, columns one after the other, 1/diagonal in the diagonal's place
+    float *stack[2];        // owned, updates that wait for their parent
+    float *whole;           // owned, in the order of elimination: the matrix's diagonal
+    float *right;           // owned, in the order of elimination
+    float **column;         // owned, of the present front
     int *waiting;           // owned, blocks on the stack
     int *at;                // owned, rows of the front that a star or an update goes to
-    double *part_right;     // owned, the right side's numbers in a front
+    float *part_right;      // owned, the right side's numbers in a front
     int order_capacity, place_capacity, row_capacity, first_capacity, local_capacity, item_capacity, right_capacity, column_capacity,
-        waiting_capacity, at_capacity, part_capacity;
+        whole_capacity, waiting_capacity, at_capacity, part_capacity;
     size_t value_capacity, stack_capacity[2];
     int widest; // front
     int part;
 };
 
-static double *room(double *old, size_t *capacity, size_t need) {
+static float *room(float *old, size_t *capacity, size_t need) {
     if (need <= *capacity)
         return old;
     free(old);
     *capacity = need + need / 8;
-    return silt_alloc(*capacity, sizeof(double));
+    return silt_alloc(*capacity, sizeof(float));
 }
 
 // ---------------------------------------------------------------- order
@@ -228,7 +229,7 @@ static void rows_find(silt_front *f, const silt_front_matrix *q) {
     }
     f->value = room(f->value, &f->value_capacity, value + DENSE_PAD);
     for (int k = 0; k < 2; k++)
-        f->stack[k] = room(f->stack[k], &f->stack_capacity[k], peak[k] + 1);
+        f->stack[k] = room(f->stack[k], &f->stack_capacity[k], peak[k] + DENSE_PAD);
     SILT_RESERVE(f->column, f->column_capacity, f->widest + 1);
     SILT_RESERVE(f->at, f->at_capacity, f->widest + 1);
     SILT_RESERVE(f->part_right, f->part_capacity, f->widest + DENSE_PAD);
@@ -245,6 +246,7 @@ void silt_front_order(silt_front **front, const silt_front_matrix *q, const doub
     SILT_RESERVE(f->local, f->local_capacity, n + 1);
     SILT_RESERVE(f->item, f->item_capacity, n + 1);
     SILT_RESERVE(f->right, f->right_capacity, n + 1);
+    SILT_RESERVE(f->whole, f->whole_capacity, n + DENSE_PAD);
     for (int i = 0; i < n; i++) {
         struct item *t = &f->item[i];
         *t = (struct item){.x = {x[2 * i], x[2 * i + 1]}, .node = i};
@@ -268,30 +270,30 @@ void silt_front_order(silt_front **front, const silt_front_matrix *q, const doub
 // ---------------------------------------------------------------- factor
 
 // the lower triangle only
-static inline void entry_add(double **column, int a, int b, double value) {
+static inline void entry_add(float **column, int a, int b, float value) {
     const int row = a > b ? a : b;
     column[a + b - row][row] += value;
 }
 
 // stars whose first node the block eliminates
 static void assemble(const silt_front *f, const silt_front_matrix *q, const struct block *b) {
-    double **column = f->column;
+    float **column = f->column;
     int *at = f->at;
     for (int p = b->begin; p < b->end; p++) {
         const int u = f->order[p];
-        column[p - b->begin][p - b->begin] += q->diagonal[u];
+        column[p - b->begin][p - b->begin] += (float)q->diagonal[u];
         for (int k = q->neighbour_start[u]; k < q->neighbour_start[u + 1]; k++) {
             const int i = q->neighbour[k];
             if (f->first[i] != p)
                 continue;
             const int start = q->neighbour_start[i], size = q->neighbour_start[i + 1] - start;
-            const double *g = q->row + 3 * start;
+            const float *g = q->row + 3 * start;
             for (int m = 0; m < size; m++)
                 at[m] = f->local[f->place[q->neighbour[start + m]]];
             const int own = f->local[f->place[i]];
-            const double weight = q->weight[i];
+            const float weight = q->weight[i];
             for (int m = 0; m < size; m++, g += 3) {
-                const double *other = q->row + 3 * start, g0 = weight * g[0], g1 = weight * g[1];
+                const float *other = q->row + 3 * start, g0 = weight * g[0], g1 = weight * g[1];
                 for (int r = 0; r < m; r++, other += 3)
                     entry_add(column, at[m], at[r], g0 * other[0] + g1 * other[1]);
                 column[at[m]][at[m]] += g0 * g[0] + g1 * g[1];
@@ -302,20 +304,20 @@ static void assemble(const silt_front *f, const silt_front_matrix *q, const stru
     }
 }
 
-static void extend_add(const silt_front *f, const struct block *child, const double *update) {
+static void extend_add(const silt_front *f, const struct block *child, const float *update) {
     const int n = child->row_end - child->row_begin, *row = f->row + child->row_begin;
     int *at = f->at;
     for (int r = 0; r < n; r++)
         at[r] = f->local[row[r]];
     for (int c = 0; c < n; c++, update += n) {
-        double *column = f->column[at[c]];
+        float *column = f->column[at[c]];
         for (int r = c; r < n; r++)
             column[at[r]] += update[r];
     }
 }
 
 // columns of the front: the block's own in the factor, the others in its update; 0 in the lower triangle
-static void columns_clear(const silt_front *f, const struct block *b, double *panel, double *update) {
+static void columns_clear(const silt_front *f, const struct block *b, float *panel, float *update) {
     const int own = b->end - b->begin, rest = b->row_end - b->row_begin, wide = own + rest;
     for (int c = 0; c < own; c++) {
         f->column[c] = panel + (size_t)c * (size_t)wide;
@@ -331,11 +333,13 @@ static void columns_clear(const silt_front *f, const struct block *b, double *pa
 
 int silt_front_factor(silt_front *f, const silt_front_matrix *q) {
     int n_waiting = 0;
-    double *top[2] = {f->stack[0], f->stack[1]};
+    float *top[2] = {f->stack[0], f->stack[1]};
+    for (int k = 0; k < f->n; k++)
+        f->whole[k] = q->whole[f->order[k]];
     for (int e = 0; e < f->n_block; e++) {
         const struct block *b = &f->block[e];
         const int own = b->end - b->begin, wide = own + b->row_end - b->row_begin;
-        double *panel = f->value + b->value, *update = top[b->side];
+        float *panel = f->value + b->value, *update = top[b->side];
         columns_clear(f, b, panel, update);
         assemble(f, q, b);
         for (int c = 0; c < b->n_child; c++) {
@@ -344,7 +348,7 @@ int silt_front_factor(silt_front *f, const silt_front_matrix *q) {
             top[!b->side] -= size * size;
             extend_add(f, child, top[!b->side]);
         }
-        const int bad = silt_dense_factor(own, wide, panel);
+        const int bad = silt_dense_factor(own, wide, f->whole + b->begin, panel);
         if (bad >= 0)
             return f->order[b->begin + bad];
         silt_dense_update(own, wide, panel, update);
@@ -357,10 +361,13 @@ int silt_front_factor(silt_front *f, const silt_front_matrix *q) {
 // ---------------------------------------------------------------- solve
 
 void silt_front_solve(silt_front *f, const double *right, double *out) {
-    double *y = f->right;
-    double *t = f->part_right;
+    float *y = f->right, *t = f->part_right;
+    double most = 0;
     for (int k = 0; k < f->n; k++)
-        y[k] = right[f->order[k]];
+        most = silt_max(most, fabs(right[k]));
+    const double scale = most > 0 ? most : 1;
+    for (int k = 0; k < f->n; k++)
+        y[k] = (float)(right[f->order[k]] / scale);
     for (int e = 0; e < f->n_block; e++) {
         const struct block *b = &f->block[e];
         const int own = b->end - b->begin, rest = b->row_end - b->row_begin, wide = own + rest, *row = f->row + b->row_begin;
@@ -382,7 +389,7 @@ void silt_front_solve(silt_front *f, const double *right, double *out) {
         memcpy(y + b->begin, t, (size_t)own * sizeof *t);
     }
     for (int k = 0; k < f->n; k++)
-        out[f->order[k]] = y[k];
+        out[f->order[k]] = scale * (double)y[k];
 }
 
 void silt_front_free(silt_front **front) {
@@ -400,6 +407,7 @@ void silt_front_free(silt_front **front) {
     free(f->stack[0]);
     free(f->stack[1]);
     free(f->right);
+    free(f->whole);
     free(f->column);
     free(f->waiting);
     free(f->at);

@@ -15,17 +15,31 @@ typedef struct silt_front silt_front;
 typedef struct silt_front_matrix {
     int n;
     const int *neighbour_start, *neighbour;
-    const double *row;      // 3 per neighbour
-    const double *weight;   // n
+    const float *row;       // 3 per neighbour
+    const float *weight;    // n
     const double *diagonal; // n
+    const float *whole;     // n, the diagonal of the sum
 } silt_front_matrix;
 
 /** The order of elimination and room for the factor. x: places, 2 per node; only the order hangs on them. Makes *front at first. */
 void silt_front_order(silt_front **front, const silt_front_matrix *matrix, const double *x);
 /** @return -1, or a node where the matrix is not positive definite */
 int silt_front_factor(silt_front *front, const silt_front_matrix *matrix);
-/** out = matrix^-1 right, which may be the same array */
+/** out = matrix^-1 right, which may be the same array, as far as single precision goes */
 void silt_front_solve(silt_front *front, const double *right, double *out);
 void silt_front_free(silt_front **front);
+
+// front_mend.c: how good that is, and better ---------------------------------------------------------------
+typedef struct silt_mend silt_mend;
+/** a new factor, of which nothing is known yet. Makes *mend at first. */
+void silt_mend_begin(silt_mend **mend);
+/** x = matrix^-1 right, so that of the right side no more than the share `tolerance` is left (root of the sum of squares in units of
+ * the diagonal). The first solve with a factor measures what it leaves: where that is well below the tolerance the next ones do
+ * without. @param iterations  counts those that the factor alone would not have needed. @return false: not definite, or no end */
+bool silt_front_mend(silt_front *front, silt_mend *mend, const silt_front_matrix *matrix, const double *right, double tolerance,
+                     double *x, int *iterations);
+/** out = matrix x */
+void silt_front_apply(const silt_front_matrix *matrix, const double *x, double *out);
+void silt_mend_free(silt_mend **mend);
 
 #endif

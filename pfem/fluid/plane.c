@@ -4,27 +4,48 @@
 
 struct silt_plane {
     silt_front *front;    // owned
+    silt_mend *mend;      // owned
+    silt_front_matrix matrix; // of the mesh that the factor belongs to
     int64_t revision;     // of the mesh that its order belongs to
-    double *star;         // owned, 3 per entry of the mesh's neighbour lists: G, free part; L
-    double *weight;       // owned, per node, 1/inertia
-    double *own, *whole;  // owned, per node, diagonal of L and of the sum
+    float *star;          // owned, 3 per entry of the mesh's neighbour lists: G, free part; L
+    float *weight;        // owned, per node, 1/inertia
+    double *own;          // owned, per node, diagonal of L
+    float *whole;         // owned, per node, diagonal of the sum
+    double *row;          // owned, of the present node
     int *place;           // owned, per node
-    int star_capacity, weight_capacity, own_capacity, whole_capacity, place_capacity;
+    int star_capacity, weight_capacity, own_capacity, whole_capacity, place_capacity, row_capacity;
 };
+
+// One row of G and couplings of L with neighbours of higher number, rounded so that both still let a constant pass: what is lacking
+// goes to the node's own entry, which is nought but on the boundary and so is rounded a million times finer.
+static void row_round(int size, int self, const double *row, float *out) {
+    double lost[2] = {0, 0};
+    for (int k = 0; k < size; k++)
+        for (int d = 0; d < 3; d++) {
+            out[3 * k + d] = d < 2 || k > self ? (float)row[3 * k + d] : 0;
+            if (d < 2 && k != self)
+                lost[d] += row[3 * k + d] - out[3 * k + d];
+        }
+    for (int d = 0; d < 2; d++)
+        out[3 * self + d] = (float)(row[3 * self + d] + lost[d]);
+}
 
 // what silt_front needs: rows of G with the couplings of L; the diagonal of L and that of the whole sum
 static void rows_assemble(silt_plane *p, const silt_fluid *f, const silt_mesh *mesh) {
     enum { D = 2, M = 3 };
-    SILT_RESERVE(p->star, p->star_capacity, 3 * mesh->neighbour_start[mesh->n_node] + 1);
-    SILT_RESERVE(p->place, p->place_capacity, mesh->n_node + 1);
-    SILT_RESERVE(p->weight, p->weight_capacity, mesh->n_node + 1);
-    SILT_RESERVE(p->own, p->own_capacity, mesh->n_node + 1);
-    SILT_RESERVE(p->whole, p->whole_capacity, mesh->n_node + 1);
-    memset(p->whole, 0, (size_t)mesh->n_node * sizeof *p->whole);
+    const int n = mesh->n_node;
+    SILT_RESERVE(p->star, p->star_capacity, 3 * mesh->neighbour_start[n] + 1);
+    SILT_RESERVE(p->place, p->place_capacity, n + 1);
+    SILT_RESERVE(p->weight, p->weight_capacity, n + 1);
+    SILT_RESERVE(p->own, p->own_capacity, n + 1);
+    SILT_RESERVE(p->whole, p->whole_capacity, n + 1);
+    memset(p->whole, 0, (size_t)n * sizeof *p->whole);
+    memset(p->own, 0, (size_t)n * sizeof *p->own);
     int *place = p->place; // of a neighbour in the present node's list
-    for (int i = 0; i < mesh->n_node; i++) {
+    for (int i = 0; i < n; i++) {
         const int start = mesh->neighbour_start[i], size = mesh->neighbour_start[i + 1] - start;
-        double *row = p->star + 3 * start;
+        SILT_RESERVE(p->row, p->row_capacity, 3 * size);
+        double *row = p->row;
         memset(row, 0, (size_t)(3 * size) * sizeof *row);
         for (int k = 0; k < size; k++)
             place[mesh->neighbour[start + k]] = k;
@@ -39,16 +60,16 @@ static void rows_assemble(silt_plane *p, const silt_fluid *f, const silt_mesh *m
                 entry[2] += weight * (mine[0] * flux[D * b] + mine[1] * flux[D * b + 1]);
             }
         }
-        p->own[i] = row[3 * place[i] + 2];
-        p->whole[i] += p->own[i];
-        for (int k = 0; k <= place[i]; k++) // the others are their neighbours'
-            row[3 * k + 2] = 0;
-        p->weight[i] = !mesh->wet[i] || f->hold[i] == HOLD_ALL ? 0 : 1 / f->inertia[i];
-        for (int k = 0; k < size; k++) {
-            double *g = row + 3 * k;
-            if (f->hold[i] != HOLD_FREE)
-                silt_hold_project(f, i, g);
-            p->whole[mesh->neighbour[start + k]] += p->weight[i] * silt_dot(D, g, g);
+        for (int k = 0; k < size && f->hold[i] != HOLD_FREE; k++)
+            silt_hold_project(f, i, row + 3 * k);
+        float *star = p->star + 3 * start;
+        row_round(size, place[i], row, star);
+        p->weight[i] = !mesh->wet[i] || f->hold[i] == HOLD_ALL ? 0 : (float)(1 / f->inertia[i]);
+        for (int k = 0; k < size; k++, star += 3) {
+            const int j = mesh->neighbour[start + k];
+            p->own[i] -= star[2];
+            p->own[j] -= star[2];
+            p->whole[j] += p->weight[i] * (star[0] * star[0] + star[1] * star[1]);
         }
     }
 }
@@ -64,22 +85,30 @@ silt_status silt_plane_factor(silt_plane **plane, const silt_fluid *f, const sil
     silt_plane *p = *plane;
     const silt_mesh *mesh = s->mesh;
     rows_assemble(p, f, mesh);
-    for (int j = 0; j < mesh->n_node; j++)
-        p->own[j] += silt_pressure_pin(mesh, pinned, j, p->whole[j]);
-    const silt_front_matrix matrix = {.n = mesh->n_node, .neighbour_start = mesh->neighbour_start, .neighbour = mesh->neighbour,
-                                      .row = p->star, .weight = p->weight, .diagonal = p->own};
+    for (int j = 0; j < mesh->n_node; j++) {
+        const double sum = p->whole[j] + p->own[j], pin = silt_pressure_pin(mesh, pinned, j, sum);
+        p->own[j] += pin;
+        p->whole[j] = (float)(sum + pin);
+    }
+    p->matrix = (silt_front_matrix){.n = mesh->n_node, .neighbour_start = mesh->neighbour_start, .neighbour = mesh->neighbour,
+                                      .row = p->star, .weight = p->weight, .diagonal = p->own, .whole = p->whole};
     if (!p->front || p->revision != mesh->revision)
-        SILT_CLOCKED(analyse, silt_front_order(&p->front, &matrix, s->nodes->x));
+        SILT_CLOCKED(analyse, silt_front_order(&p->front, &p->matrix, s->nodes->x));
     p->revision = mesh->revision;
+    silt_mend_begin(&p->mend);
     int bad;
-    SILT_CLOCKED(factor, bad = silt_front_factor(p->front, &matrix));
+    SILT_CLOCKED(factor, bad = silt_front_factor(p->front, &p->matrix));
     if (bad < 0)
         return SILT_OK;
     p->revision = -1;
     return silt_pressure_indefinite(s, bad, err);
 }
 
-void silt_plane_solve(silt_plane *p, const double *right, double *out) { silt_front_solve(p->front, right, out); }
+silt_status silt_plane_solve(silt_plane *p, const double *right, double tolerance, double *out, int *iterations, silt_error *err) {
+    if (silt_front_mend(p->front, p->mend, &p->matrix, right, tolerance, out, iterations))
+        return SILT_OK;
+    return silt_fail(err, SILT_FAILED, "the pressure system could not be solved (%d nodes)", p->matrix.n);
+}
 
 void silt_plane_forget(silt_plane *p) {
     if (p)
@@ -91,11 +120,13 @@ void silt_plane_free(silt_plane **plane) {
     if (!p)
         return;
     silt_front_free(&p->front);
+    silt_mend_free(&p->mend);
     free(p->star);
     free(p->weight);
     free(p->own);
     free(p->whole);
     free(p->place);
+    free(p->row);
     free(p);
     *plane = NULL;
 }
