@@ -22,5 +22,8 @@ void silt_dense_update(int own, int wide, const float *panel, float *update);
 void silt_dense_forward(int own, int wide, const float *panel, float *t);
 /** t (the first own) = L^-T (t - L21^T rest of t) */
 void silt_dense_backward(int own, int wide, const float *panel, float *t);
+/** Adds an update of n rows and columns, lower triangle, to the columns of a front, which start at row 0: row r goes to at[r]. at rises,
+ * by one up to the row before end[r]. */
+void silt_dense_scatter(int n, const int *at, const int *end, const float *update, float **column);
 
 #endif

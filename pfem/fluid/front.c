@@ -37,9 +37,10 @@ struct silt_front {
     float **column;         // owned, of the present front
     int *waiting;           // owned, blocks on the stack
     int *at;                // owned, rows of the front that a star or an update goes to
+    int *run;               // owned, ends of runs among these
     float *part_right;      // owned, the right side's numbers in a front
     int order_capacity, place_capacity, row_capacity, first_capacity, local_capacity, item_capacity, right_capacity, column_capacity,
-        whole_capacity, waiting_capacity, at_capacity, part_capacity;
+        whole_capacity, waiting_capacity, at_capacity, run_capacity, part_capacity;
     size_t value_capacity, stack_capacity[2];
     int widest; // front
     int part;
@@ -232,6 +233,7 @@ static void rows_find(silt_front *f, const silt_front_matrix *q) {
         f->stack[k] = room(f->stack[k], &f->stack_capacity[k], peak[k] + DENSE_PAD);
     SILT_RESERVE(f->column, f->column_capacity, f->widest + 1);
     SILT_RESERVE(f->at, f->at_capacity, f->widest + 1);
+    SILT_RESERVE(f->run, f->run_capacity, f->widest + 1);
     SILT_RESERVE(f->part_right, f->part_capacity, f->widest + DENSE_PAD);
 }
 
@@ -304,16 +306,15 @@ static void assemble(const silt_front *f, const silt_front_matrix *q, const stru
     }
 }
 
+// Adds a child's update. Its rows stand in the front in runs of neighbours, ten or so: by runs it takes half the time.
 static void extend_add(const silt_front *f, const struct block *child, const float *update) {
     const int n = child->row_end - child->row_begin, *row = f->row + child->row_begin;
-    int *at = f->at;
+    int *at = f->at, *end = f->run; // of the run that a row is in
     for (int r = 0; r < n; r++)
         at[r] = f->local[row[r]];
-    for (int c = 0; c < n; c++, update += n) {
-        float *column = f->column[at[c]];
-        for (int r = c; r < n; r++)
-            column[at[r]] += update[r];
-    }
+    for (int r = n - 1; r >= 0; r--)
+        end[r] = r + 1 < n && at[r + 1] == at[r] + 1 ? end[r + 1] : r + 1;
+    silt_dense_scatter(n, at, end, update, f->column);
 }
 
 // columns of the front: the block's own in the factor, the others in its update; 0 in the lower triangle
@@ -411,6 +412,7 @@ void silt_front_free(silt_front **front) {
     free(f->column);
     free(f->waiting);
     free(f->at);
+    free(f->run);
     free(f->part_right);
     free(f);
     *front = NULL;
