@@ -18,16 +18,17 @@ struct silt_plane {
 
 // One row of G and couplings of L with neighbours of higher number, rounded so that both still let a constant pass: what is lacking
 // goes to the node's own entry, which is nought but on the boundary and so is rounded a million times finer.
-static void row_round(int size, int self, const double *row, float *out) {
+static inline void row_round(int size, int self, const double *row, float *out) {
     double lost[2] = {0, 0};
-    for (int k = 0; k < size; k++)
-        for (int d = 0; d < 3; d++) {
-            out[3 * k + d] = d < 2 || k > self ? (float)row[3 * k + d] : 0;
-            if (d < 2 && k != self)
-                lost[d] += row[3 * k + d] - out[3 * k + d];
+    for (int k = 0; k < size; k++) {
+        for (int d = 0; d < 2; d++) {
+            out[3 * k + d] = (float)row[3 * k + d];
+            lost[d] += row[3 * k + d] - out[3 * k + d];
         }
+        out[3 * k + 2] = k > self ? (float)row[3 * k + 2] : 0;
+    }
     for (int d = 0; d < 2; d++)
-        out[3 * self + d] = (float)(row[3 * self + d] + lost[d]);
+        out[3 * self + d] = (float)(out[3 * self + d] + lost[d]);
 }
 
 // what silt_front needs: rows of G with the couplings of L; the diagonal of L and that of the whole sum
@@ -39,9 +40,11 @@ static void rows_assemble(silt_plane *p, const silt_fluid *f, const silt_mesh *m
     SILT_RESERVE(p->weight, p->weight_capacity, n + 1);
     SILT_RESERVE(p->own, p->own_capacity, n + 1);
     SILT_RESERVE(p->whole, p->whole_capacity, n + 1);
-    memset(p->whole, 0, (size_t)n * sizeof *p->whole);
-    memset(p->own, 0, (size_t)n * sizeof *p->own);
+    double *own = p->own;
+    float *whole = p->whole;
     int *place = p->place; // of a neighbour in the present node's list
+    memset(whole, 0, (size_t)n * sizeof *whole);
+    memset(own, 0, (size_t)n * sizeof *own);
     for (int i = 0; i < n; i++) {
         const int start = mesh->neighbour_start[i], size = mesh->neighbour_start[i + 1] - start;
         SILT_RESERVE(p->row, p->row_capacity, 3 * size);
@@ -64,13 +67,15 @@ static void rows_assemble(silt_plane *p, const silt_fluid *f, const silt_mesh *m
             silt_hold_project(f, i, row + 3 * k);
         float *star = p->star + 3 * start;
         row_round(size, place[i], row, star);
-        p->weight[i] = !mesh->wet[i] || f->hold[i] == HOLD_ALL ? 0 : (float)(1 / f->inertia[i]);
-        for (int k = 0; k < size; k++, star += 3) {
-            const int j = mesh->neighbour[start + k];
-            p->own[i] -= star[2];
-            p->own[j] -= star[2];
-            p->whole[j] += p->weight[i] * (star[0] * star[0] + star[1] * star[1]);
+        const float weigh = p->weight[i] = !mesh->wet[i] || f->hold[i] == HOLD_ALL ? 0 : (float)(1 / f->inertia[i]);
+        for (int k = 0; k < size; k++)
+            whole[mesh->neighbour[start + k]] += weigh * (star[3 * k] * star[3 * k] + star[3 * k + 1] * star[3 * k + 1]);
+        double sum = own[i];
+        for (int k = place[i] + 1; k < size; k++) {
+            own[mesh->neighbour[start + k]] -= star[3 * k + 2];
+            sum -= star[3 * k + 2];
         }
+        own[i] = sum;
     }
 }
 
