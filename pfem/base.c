@@ -3,7 +3,11 @@
  */
 #include "base.h"
 
+#include <stdint.h>
+#include <sys/mman.h>
 #include <time.h>
+
+#define LARGE ((size_t)4 << 20) // bytes of an array from which it is worth pages of 2 MB
 
 silt_status silt_fail(silt_error *err, silt_status status, const char *format, ...) {
     if (!err)
@@ -26,10 +30,18 @@ static void memory_exhausted(size_t n, size_t size) {
     abort();
 }
 
+// Large pages for a large array: at 160k nodes a step misses its address fewer times by 7 % of its time. A wish, no more.
+static void large_pages(void *data, size_t bytes) {
+    const uintptr_t page = 4096, begin = ((uintptr_t)data + page - 1) / page * page, end = ((uintptr_t)data + bytes) / page * page;
+    if (bytes >= LARGE)
+        madvise((void *)begin, end - begin, MADV_HUGEPAGE);
+}
+
 void *silt_alloc(size_t n, size_t size) {
     void *data = calloc(n ? n : 1, size ? size : 1);
     if (!data)
         memory_exhausted(n, size);
+    large_pages(data, n * size);
     return data;
 }
 
@@ -44,12 +56,21 @@ void *silt_grow(void *data, int *capacity, int need, size_t size) {
         wanted = INT32_MAX;
     size_t bytes = 0;
     void *grown = NULL;
-    if (!__builtin_mul_overflow((size_t)wanted, size, &bytes))
-        grown = realloc(data, bytes ? bytes : 1);
-    if (!grown)
-        memory_exhausted((size_t)wanted, size);
-    size_t old = (size_t)*capacity * size;
-    memset((char *)grown + old, 0, bytes - old);
+    const bool fits = !__builtin_mul_overflow((size_t)wanted, size, &bytes);
+    const size_t old = (size_t)*capacity * size;
+    if (fits && bytes >= LARGE / 4 && (grown = calloc(1, bytes))) {
+        // pages that nobody has written to take no memory: what is beyond the need is free
+        large_pages(grown, bytes);
+        if (old)
+            memcpy(grown, data, old);
+        free(data);
+    } else {
+        if (fits)
+            grown = realloc(data, bytes ? bytes : 1);
+        if (!grown)
+            memory_exhausted((size_t)wanted, size);
+        memset((char *)grown + old, 0, bytes - old);
+    }
     *capacity = (int)wanted;
     return grown;
 }

@@ -4,6 +4,7 @@
 
 #include <argp.h>
 #include <errno.h>
+#include <malloc.h>
 #include <sys/stat.h>
 
 const char *argp_program_version = "silt " SILT_VERSION;
@@ -260,6 +261,8 @@ static void main_parse(main_arguments *a, int argc, char **argv) {
 }
 
 int main(int argc, char **argv) {
+    // large arrays come from the system and go back to it: in a heap that grows as it likes they leave holes, a tenth of the peak
+    mallopt(M_MMAP_THRESHOLD, 1 << 20);
     main_arguments a = {.frame = -2};
     silt_error err = {0};
     const char *word = argc > 1 ? argv[1] : "";
