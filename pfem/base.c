@@ -58,7 +58,7 @@ void *silt_grow(void *data, int *capacity, int need, size_t size) {
     void *grown = NULL;
     const bool fits = !__builtin_mul_overflow((size_t)wanted, size, &bytes);
     const size_t old = (size_t)*capacity * size;
-    if (fits && bytes >= LARGE / 4 && (grown = calloc(1, bytes))) {
+    if (fits && bytes >= LARGE / 32 && (grown = calloc(1, bytes))) {
         // pages that nobody has written to take no memory: what is beyond the need is free
         large_pages(grown, bytes);
         if (old)

@@ -262,7 +262,7 @@ static void main_parse(main_arguments *a, int argc, char **argv) {
 
 int main(int argc, char **argv) {
     // large arrays come from the system and go back to it: in a heap that grows as it likes they leave holes, a tenth of the peak
-    mallopt(M_MMAP_THRESHOLD, 1 << 20);
+    mallopt(M_MMAP_THRESHOLD, 1 << 17);
     main_arguments a = {.frame = -2};
     silt_error err = {0};
     const char *word = argc > 1 ? argv[1] : "";
