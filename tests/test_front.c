@@ -89,27 +89,26 @@ static void graph_check(graph *g) {
     double *right = silt_alloc(n, sizeof *right), *answer = silt_alloc(n, sizeof *answer), *got = silt_alloc(n, sizeof *got),
            *again = silt_alloc(n, sizeof *again);
     silt_front *front = NULL;
-    silt_mend *mend = NULL;
+    double share = 0, *work[3];
+    for (int k = 0; k < 3; k++)
+        work[k] = silt_alloc((size_t)g->n, sizeof **work);
     int more = 0;
     for (size_t i = 0; i < n; i++)
         answer[i] = silt_uniform(&g->state) - 0.5;
     apply(g, answer, right);
     silt_front_order(&front, &g->matrix, g->x);
     assert_int_equal(silt_front_factor(front, &g->matrix), -1);
-    silt_mend_begin(&mend);
-    assert_true(silt_front_mend(front, mend, &g->matrix, right, 1e-14, got, &more));
+    assert_true(silt_front_mend(front, &g->matrix, right, 1e-14, got, work, &share, &more));
     for (size_t i = 0; i < n; i++)
         assert_true(fabs(got[i] - answer[i]) < 1e-11);
     assert_in_range(more, 0, 3);
     // that measured what a solve alone leaves
     more = 0;
-    assert_true(silt_front_mend(front, mend, &g->matrix, right, 1e-3, got, &more));
+    assert_true(silt_front_mend(front, &g->matrix, right, 1e-3, got, work, &share, &more));
     assert_int_equal(more, 0);
     silt_front_apply(&g->matrix, got, again);
     for (size_t i = 0; i < n; i++)
         assert_true(fabs(again[i] - right[i]) < 1e-5 * g->whole[i]);
-    silt_mend_free(&mend);
-    assert_null(mend);
     silt_front_solve(front, right, got);
     memcpy(again, right, n * sizeof *right);
     silt_front_order(&front, &g->matrix, g->x);
@@ -125,6 +124,8 @@ static void graph_check(graph *g) {
     free(answer);
     free(got);
     free(again);
+    for (int k = 0; k < 3; k++)
+        free(work[k]);
     graph_close(g);
 }
 
@@ -234,12 +235,13 @@ static void loose(void **state) {
         got[i] = silt_uniform(&g.state) - 0.5;
     apply(&g, got, right);
     silt_front *front = NULL;
-    silt_mend *mend = NULL;
+    double share = 0, *work[3];
+    for (int k = 0; k < 3; k++)
+        work[k] = silt_alloc((size_t)g.n, sizeof **work);
     int more = 0;
     silt_front_order(&front, &g.matrix, g.x);
     assert_int_equal(silt_front_factor(front, &g.matrix), -1);
-    silt_mend_begin(&mend);
-    assert_true(silt_front_mend(front, mend, &g.matrix, right, 1e-10, got, &more));
+    assert_true(silt_front_mend(front, &g.matrix, right, 1e-10, got, work, &share, &more));
     assert_in_range(more, 0, 12);
     double *again = silt_alloc((size_t)g.n, sizeof *again);
     apply(&g, got, again);
@@ -250,7 +252,8 @@ static void loose(void **state) {
     free(got);
     free(again);
     silt_front_free(&front);
-    silt_mend_free(&mend);
+    for (int k = 0; k < 3; k++)
+        free(work[k]);
     graph_close(&g);
 }
 

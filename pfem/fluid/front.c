@@ -29,7 +29,7 @@ struct silt_front {
     int *row;               // owned, places, rising in a block
     int *first;             // owned, of each star, the lowest place
     int *local;             // owned, per place: row in the front; in the dissection: part
-    struct item *item;      // owned
+    struct item *item;      // in a stack's memory, while nothing waits there
     float *value;           // owned, panels, columns one after the other, 1/diagonal in the diagonal's place
     float *stack[2];        // owned, updates that wait for their parent
     float *whole;           // owned, in the order of elimination: the matrix's diagonal
@@ -39,7 +39,7 @@ struct silt_front {
     int *at;                // owned, rows of the front that a star or an update goes to
     int *run;               // owned, ends of runs among these
     float *part_right;      // owned, the right side's numbers in a front
-    int order_capacity, place_capacity, row_capacity, first_capacity, local_capacity, item_capacity, right_capacity, column_capacity,
+    int order_capacity, place_capacity, row_capacity, first_capacity, local_capacity, right_capacity, column_capacity,
         whole_capacity, waiting_capacity, at_capacity, run_capacity, part_capacity;
     size_t value_capacity, stack_capacity[2];
     int widest; // front
@@ -246,7 +246,8 @@ void silt_front_order(silt_front **front, const silt_front_matrix *q, const doub
     SILT_RESERVE(f->place, f->place_capacity, n + 1);
     SILT_RESERVE(f->first, f->first_capacity, n + 1);
     SILT_RESERVE(f->local, f->local_capacity, n + 1);
-    SILT_RESERVE(f->item, f->item_capacity, n + 1);
+    f->stack[0] = room(f->stack[0], &f->stack_capacity[0], sizeof(struct item) / sizeof(float) * (size_t)(n + 1));
+    f->item = (struct item *)(void *)f->stack[0];
     SILT_RESERVE(f->right, f->right_capacity, n + 1);
     SILT_RESERVE(f->whole, f->whole_capacity, n + DENSE_PAD);
     for (int i = 0; i < n; i++) {
@@ -403,7 +404,6 @@ void silt_front_free(silt_front **front) {
     free(f->row);
     free(f->first);
     free(f->local);
-    free(f->item);
     free(f->value);
     free(f->stack[0]);
     free(f->stack[1]);

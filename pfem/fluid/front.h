@@ -30,16 +30,15 @@ void silt_front_solve(silt_front *front, const double *right, double *out);
 void silt_front_free(silt_front **front);
 
 // front_mend.c: how good that is, and better ---------------------------------------------------------------
-typedef struct silt_mend silt_mend;
-/** a new factor, of which nothing is known yet. Makes *mend at first. */
-void silt_mend_begin(silt_mend **mend);
 /** x = matrix^-1 right, so that of the right side no more than the share `tolerance` is left (root of the sum of squares in units of
  * the diagonal). The first solve with a factor measures what it leaves: where that is well below the tolerance the next ones do
- * without. @param iterations  counts those that the factor alone would not have needed. @return false: not definite, or no end */
-bool silt_front_mend(silt_front *front, silt_mend *mend, const silt_front_matrix *matrix, const double *right, double tolerance,
-                     double *x, int *iterations);
+ * without.
+ * @param work   n numbers each
+ * @param share  in and out, of a right side that a solve with this factor leaves; 0 where that is not known yet
+ * @param iterations  counts those that the factor alone would not have needed. @return false: not definite, or no end */
+bool silt_front_mend(silt_front *front, const silt_front_matrix *matrix, const double *right, double tolerance, double *x,
+                     double *const work[3], double *share, int *iterations);
 /** out = matrix x */
 void silt_front_apply(const silt_front_matrix *matrix, const double *x, double *out);
-void silt_mend_free(silt_mend **mend);
 
 #endif

@@ -4,29 +4,6 @@
 #define MEND_LIMIT 200
 #define MEND_TRUST 3 // a solve may leave that many times what the measured one left
 
-struct silt_mend {
-    double left;          // share of a right side that a solve with the factor leaves; 0: not known
-    double *r, *d, *ad;   // owned, per node
-    int r_capacity, d_capacity, ad_capacity;
-};
-
-void silt_mend_free(silt_mend **mend) {
-    silt_mend *m = *mend;
-    if (!m)
-        return;
-    free(m->r);
-    free(m->d);
-    free(m->ad);
-    free(m);
-    *mend = NULL;
-}
-
-void silt_mend_begin(silt_mend **mend) {
-    if (!*mend)
-        *mend = silt_alloc(1, sizeof **mend);
-    (*mend)->left = 0;
-}
-
 void silt_front_apply(const silt_front_matrix *q, const double *x, double *out) {
     for (int i = 0; i < q->n; i++)
         out[i] = q->diagonal[i] * x[i];
@@ -65,17 +42,14 @@ static double size(const silt_front_matrix *q, const double *r) {
     return sum;
 }
 
-bool silt_front_mend(silt_front *front, silt_mend *m, const silt_front_matrix *q, const double *right, double tolerance, double *x,
-                     int *iterations) {
+bool silt_front_mend(silt_front *front, const silt_front_matrix *q, const double *right, double tolerance, double *x,
+                     double *const work[3], double *share, int *iterations) {
     const int n = q->n;
-    if (m->left > 0 && MEND_TRUST * m->left <= tolerance) {
+    if (*share > 0 && MEND_TRUST * *share <= tolerance) {
         silt_front_solve(front, right, x);
         return true;
     }
-    SILT_RESERVE(m->r, m->r_capacity, n + 1);
-    SILT_RESERVE(m->d, m->d_capacity, n + 1);
-    SILT_RESERVE(m->ad, m->ad_capacity, n + 1);
-    double *r = m->r, *d = m->d, *z = m->ad, *ad = m->ad, before = 0;
+    double *r = work[0], *d = work[1], *z = work[2], *ad = work[2], before = 0;
     memcpy(r, right, (size_t)n * sizeof *r);
     memset(x, 0, (size_t)n * sizeof *x);
     const double start = size(q, r);
@@ -96,7 +70,7 @@ bool silt_front_mend(silt_front *front, silt_mend *m, const silt_front_matrix *q
         *iterations += k > 0;
         const double left = sqrt(size(q, r) / start);
         if (k == 0)
-            m->left = silt_max(left, m->left);
+            *share = silt_max(left, *share);
         if (left <= tolerance)
             return true;
     }

@@ -4,7 +4,7 @@
 
 struct silt_plane {
     silt_front *front;    // owned
-    silt_mend *mend;      // owned
+    double share;         // of a right side that a solve with the factor leaves; 0: not known yet
     silt_front_matrix matrix; // of the mesh that the factor belongs to
     int64_t revision;     // of the mesh that its order belongs to
     float *star;          // owned, 3 per entry of the mesh's neighbour lists: G, free part; L
@@ -100,7 +100,7 @@ silt_status silt_plane_factor(silt_plane **plane, const silt_fluid *f, const sil
     if (!p->front || p->revision != mesh->revision)
         SILT_CLOCKED(analyse, silt_front_order(&p->front, &p->matrix, s->nodes->x));
     p->revision = mesh->revision;
-    silt_mend_begin(&p->mend);
+    p->share = 0;
     int bad;
     SILT_CLOCKED(factor, bad = silt_front_factor(p->front, &p->matrix));
     if (bad < 0)
@@ -109,8 +109,9 @@ silt_status silt_plane_factor(silt_plane **plane, const silt_fluid *f, const sil
     return silt_pressure_indefinite(s, bad, err);
 }
 
-silt_status silt_plane_solve(silt_plane *p, const double *right, double tolerance, double *out, int *iterations, silt_error *err) {
-    if (silt_front_mend(p->front, p->mend, &p->matrix, right, tolerance, out, iterations))
+silt_status silt_plane_solve(silt_plane *p, silt_fluid *f, const double *right, double tolerance, double *out, silt_error *err) {
+    double *const work[3] = {f->cg[0], f->cg[0] + p->matrix.n, f->cg[1]};
+    if (silt_front_mend(p->front, &p->matrix, right, tolerance, out, work, &p->share, &f->pressure_iterations))
         return SILT_OK;
     return silt_fail(err, SILT_FAILED, "the pressure system could not be solved (%d nodes)", p->matrix.n);
 }
@@ -125,7 +126,6 @@ void silt_plane_free(silt_plane **plane) {
     if (!p)
         return;
     silt_front_free(&p->front);
-    silt_mend_free(&p->mend);
     free(p->star);
     free(p->weight);
     free(p->own);
