@@ -249,8 +249,6 @@ typedef struct silt_memory {
 void silt_memory_clear(silt_memory *memory);
 /** Takes down the present mesh with its areas at positions x (before the cloud is edited). */
 void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nodes *nodes);
-/** Frees what no one asks for until the next silt_memory_take: the step's peak is in the pressure's factor. */
-void silt_memory_rest(silt_memory *memory);
 /** Makes the memory's flags as long as the cloud is now. */
 void silt_memory_extend(silt_memory *memory, int n_node);
 /** Marks crowded nodes dead and adds nodes where the mesh is stretched, against the local size (refine.c). Nodes added on

@@ -8,7 +8,9 @@
 
 #include "base.h"
 
-#define DENSE_PAD 16 // numbers past the end of a panel, an update or a right side that may be read and are written as they were
+// numbers past the end of a panel, an update or a right side that may be read and are written as they were. Whatever they are changes
+// nothing, but where they are denormal, as whole numbers taken for floats are, a product takes five times as long.
+#define DENSE_PAD 16
 #define DENSE_LEAST 3e-6f // share of the matrix's diagonal below which a pivot is rounding: several hundred sums of 6e-8
 
 /** A panel of `wide` rows and `own` columns, lower triangle first: L of its top, L21 of the rest, 1/diagonal in the diagonal's place.

@@ -40,20 +40,6 @@ void silt_memory_clear(silt_memory *memory) {
     *memory = (silt_memory){0};
 }
 
-void silt_memory_rest(silt_memory *memory) {
-    free(memory->cell);
-    free(memory->area);
-    free(memory->x);
-    free(memory->group_start);
-    free(memory->exchange);
-    memory->cell = NULL;
-    memory->area = memory->x = NULL;
-    memory->group_start = NULL;
-    memory->exchange = NULL;
-    memory->cell_capacity = memory->area_capacity = memory->place_capacity = memory->group_capacity = memory->exchange_capacity = 0;
-    memory->n_cell = memory->n_place = memory->n_group = memory->n_exchange = 0;
-}
-
 void silt_memory_extend(silt_memory *memory, int n_node) {
     SILT_RESERVE(memory->interior, memory->flag_capacity, n_node + 1);
     SILT_RESERVE(memory->dead, memory->dead_capacity, n_node + 1);

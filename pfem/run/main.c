@@ -4,7 +4,6 @@
 
 #include <argp.h>
 #include <errno.h>
-#include <malloc.h>
 #include <sys/stat.h>
 
 const char *argp_program_version = "silt " SILT_VERSION;
@@ -261,8 +260,7 @@ static void main_parse(main_arguments *a, int argc, char **argv) {
 }
 
 int main(int argc, char **argv) {
-    // large arrays come from the system and go back to it: in a heap that grows as it likes they leave holes, a tenth of the peak
-    mallopt(M_MMAP_THRESHOLD, 1 << 17);
+    silt_memory_settle();
     main_arguments a = {.frame = -2};
     silt_error err = {0};
     const char *word = argc > 1 ? argv[1] : "";

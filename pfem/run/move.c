@@ -261,17 +261,6 @@ static void potential_add(silt_run *run, double sign) {
             nodes->p[i] += sign * fluid->density * silt_formula_potential(&fluid->force, nodes->x + silt_nodes_dim(nodes) * i);
 }
 
-// what only the move needs: 100 B a node less where the step's peak is
-static void rest(silt_run *run) {
-    silt_memory_rest(&run->memory);
-    free(run->v_before);
-    free(run->debt_before);
-    free(run->wall_before);
-    run->v_before = run->debt_before = NULL;
-    run->wall_before = NULL;
-    run->v_before_capacity = run->debt_before_capacity = run->wall_before_capacity = 0;
-}
-
 silt_status silt_run_move(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     silt_nodes *nodes = &run->nodes;
@@ -357,7 +346,6 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     SILT_CLOCKED(refine, silt_size_update(run->size, nodes, mesh));
     SILT_TRY(silt_run_pockets(run, err));
     silt_run_locate(run);
-    rest(run);
     silt_clock_to(CLOCK_rest);
     return SILT_OK;
 }
