@@ -149,6 +149,37 @@ static void cloud(void **state) {
     }
 }
 
+static bool close_by(const graph *g, int i, int j) {
+    return silt_square(g->x[2 * i] - g->x[2 * j]) + silt_square(g->x[2 * i + 1] - g->x[2 * j + 1]) < silt_square(0.03);
+}
+
+// the same bits for any number of threads
+static void threads(void **state) {
+    (void)state;
+    graph g;
+    const int n = 2500;
+    graph_open(&g, n);
+    scatter(&g);
+    graph_join(&g, close_by);
+    double *right = silt_alloc((size_t)n, sizeof *right), *got[3];
+    for (int i = 0; i < n; i++)
+        right[i] = silt_uniform(&g.state) - 0.5;
+    for (int k = 0; k < 3; k++) {
+        silt_front *front = NULL;
+        got[k] = silt_alloc((size_t)n, sizeof **got);
+        g.matrix.threads = k + 1;
+        silt_front_order(&front, &g.matrix, g.x);
+        assert_int_equal(silt_front_factor(front, &g.matrix), -1);
+        silt_front_solve(front, right, got[k]);
+        assert_memory_equal(got[k], got[0], (size_t)n * sizeof **got);
+        silt_front_free(&front);
+    }
+    for (int k = 0; k < 3; k++)
+        free(got[k]);
+    free(right);
+    graph_close(&g);
+}
+
 // joined across the border, so that nothing is near in place
 static bool around(const graph *g, int i, int j) {
     const double dx = fabs(g->x[2 * i] - g->x[2 * j]), dy = g->x[2 * i + 1] - g->x[2 * j + 1];
@@ -314,7 +345,7 @@ static void dense(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(cloud), cmocka_unit_test(periodic), cmocka_unit_test(hubs),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(cloud), cmocka_unit_test(threads), cmocka_unit_test(periodic), cmocka_unit_test(hubs),
                                        cmocka_unit_test(odd), cmocka_unit_test(loose),
                                        cmocka_unit_test(dense)};
     return cmocka_run_group_tests(tests, NULL, NULL);

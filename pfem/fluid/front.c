@@ -529,9 +529,9 @@ static void pass_run(const pass *p) {
 static void factor_after(const pass *p, struct worker *w, struct branch *t) { branch_factor(p->f, w, p->q, t); }
 
 // as many workers as there are threads and branches
-static void workers_make(silt_front *f) {
-    const int most = omp_get_max_threads();
-    f->n_worker = most < f->n_branch ? most : f->n_branch > 1 ? f->n_branch : 1;
+static void workers_make(silt_front *f, int most) {
+    most = most < f->n_branch ? most : f->n_branch;
+    f->n_worker = most > 1 ? most : 1;
     SILT_RESERVE(f->worker, f->worker_capacity, f->n_worker);
     for (int k = 0; k < f->n_worker; k++) {
         struct worker *w = &f->worker[k];
@@ -550,7 +550,7 @@ static void workers_make(silt_front *f) {
 int silt_front_factor(silt_front *f, const silt_front_matrix *q) {
     for (int k = 0; k < f->n; k++)
         f->whole[k] = q->whole[f->order[k]];
-    workers_make(f);
+    workers_make(f, q->threads);
     pass_run(&(pass){.f = f, .q = q, .after = factor_after});
     for (int k = 0; k < f->n_worker; k++)
         for (int side = 0; side < 2; side++) {

@@ -19,6 +19,7 @@ typedef struct silt_front_matrix {
     const float *weight;    // n
     const double *diagonal; // n
     const float *whole;     // n, the diagonal of the sum
+    int threads;            // that may work at it, 0 counts as one; the bits do not hang on it
 } silt_front_matrix;
 
 /** The order of elimination and room for the factor. x: places, 2 per node; only the order hangs on them. Makes *front at first. */
