@@ -8,7 +8,7 @@
 #include <sys/mman.h>
 #include <time.h>
 
-#define LARGE ((size_t)4 << 20) // bytes of an array from which it is worth pages of 2 MB
+#define LARGE ((size_t)1 << 18) // bytes of an array from which it is to lie on pages of 2 MB
 #define APART ((size_t)1 << 17) // bytes from which an array that lasts is kept out of the heap
 #define HEAP_MOST (32 << 20)    // bytes up to which what is needed for a moment comes from the heap: new pages cost 0.4 ns a byte
 
@@ -33,9 +33,10 @@ static void memory_exhausted(size_t n, size_t size) {
     abort();
 }
 
-// Large pages for a large array: at 160k nodes a step misses its address fewer times by 7 % of its time. A wish, no more.
+// Large pages: a step looks fewer addresses up, by 5 % of its time at 40k nodes and 7 % at 160k. From the page that the array begins
+// on, so that arrays beside each other share them. A wish, no more.
 static void large_pages(void *data, size_t bytes) {
-    const uintptr_t page = 4096, begin = ((uintptr_t)data + page - 1) / page * page, end = ((uintptr_t)data + bytes) / page * page;
+    const uintptr_t page = 4096, begin = (uintptr_t)data / page * page, end = ((uintptr_t)data + bytes) / page * page;
     if (bytes >= LARGE)
         madvise((void *)begin, end - begin, MADV_HUGEPAGE);
 }

@@ -42,7 +42,7 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         f->field = silt_grow(f->field, &have, (need) * (per), sizeof *f->field);                                       \
     } while (0)
     if (n_node > f->node_capacity) {
-        const int need = n_node + n_node / 2 + 64, have_nodes = f->node_capacity;
+        const int need = n_node + n_node / 8 + 64, have_nodes = f->node_capacity;
         ROOM(x_mid, D, have_nodes, need);
         ROOM(w, D, have_nodes, need);
         ROOM(star, D, have_nodes, need);
@@ -72,7 +72,7 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         f->node_capacity = need;
     }
     if (n_cell > f->cell_capacity) {
-        const int need = n_cell + n_cell / 2 + 64, have_cells = f->cell_capacity;
+        const int need = n_cell + n_cell / 8 + 64, have_cells = f->cell_capacity;
         ROOM(flux, (D + 1) * D, have_cells, need);
         ROOM(cell_volume, 1, have_cells, need);
         ROOM(start, 1, have_cells, need);
