@@ -94,7 +94,7 @@ DENSE_INLINE int triangle_factor(int columns, size_t ld, const float *whole, flo
                 t[r + ld * (size_t)j] = value * t[j + ld * (size_t)j];
                 continue;
             }
-            if (!(value > -DENSE_LEAST * whole[j]))
+            if (!(value > -DENSE_WRONG * whole[j]))
                 return j;
             t[r + ld * (size_t)j] = 1 / sqrtf(value > DENSE_LEAST * whole[j] ? value : whole[j]);
         }

@@ -13,6 +13,8 @@
 #define DENSE_PAD 16
 #define DENSE_LEAST 3e-6f // share of the matrix's diagonal below which a pivot is rounding: several hundred sums of 6e-8
 
+#define DENSE_WRONG 1e-3f // share below which a negative one is none: the worst that a thousand roundings one way come to is 6e-5
+
 /** A panel of `wide` rows and `own` columns, lower triangle first: L of its top, L21 of the rest, 1/diagonal in the diagonal's place.
  * @param whole  the matrix's diagonal, of each column; it takes the place of a pivot that is rounding: what is known up to a constant
  * gets it fixed there
