@@ -1,7 +1,8 @@
 /** @file front.h
  * Direct solution of a symmetric positive definite system whose matrix is a sum over the nodes' stars (a node and its neighbours),
  * 2-D: nested dissection by place, then fronts (Duff and Reid, ACM Trans. Math. Softw. 9, 1983). The matrix is never put
- * together: a star goes straight into the front that eliminates the first of its nodes.
+ * together: a star goes straight into the front that eliminates the first of its nodes. Single precision: half the memory and twice
+ * the numbers at a time of double (factor and solves at 160k nodes 3600 -> 1960 ns a node and step); front_mend.c makes up for it.
  */
 #ifndef SILT_FRONT_H
 #define SILT_FRONT_H
@@ -24,7 +25,7 @@ typedef struct silt_front_matrix {
 
 /** The order of elimination and room for the factor. x: places, 2 per node; only the order hangs on them. Makes *front at first. */
 void silt_front_order(silt_front **front, const silt_front_matrix *matrix, const double *x);
-/** @return -1, or a node where the matrix is not positive definite */
+/** @return -1, or a node where the matrix is not positive definite, by more than rounding */
 int silt_front_factor(silt_front *front, const silt_front_matrix *matrix);
 /** out = matrix^-1 right, which may be the same array, as far as single precision goes */
 void silt_front_solve(silt_front *front, const double *right, double *out);
