@@ -52,6 +52,7 @@ bool silt_front_mend(silt_front *front, const silt_front_matrix *q, const double
     double *r = work[0], *d = work[1], *z = work[2], *ad = work[2], before = 0;
     memcpy(r, right, (size_t)n * sizeof *r);
     memset(x, 0, (size_t)n * sizeof *x);
+    memset(d, 0, (size_t)n * sizeof *d);
     const double start = size(q, r);
     for (int k = 0; k < MEND_LIMIT && start > 0; k++) {
         silt_front_solve(front, r, z);
@@ -69,10 +70,10 @@ bool silt_front_mend(silt_front *front, const silt_front_matrix *q, const double
         before = rz;
         *iterations += k > 0;
         const double left = sqrt(size(q, r) / start);
-        if (k == 0)
-            *share = silt_max(left, *share);
+        if (k == 0) // the factor alone would have taken a step of 1
+            *share = silt_max(*share, silt_max(left, fabs(alpha - 1)));
         if (left <= tolerance)
             return true;
     }
-    return !(start > 0);
+    return start == 0;
 }
