@@ -109,6 +109,18 @@ static void graph_check(graph *g) {
     silt_front_apply(&g->matrix, got, again);
     for (size_t i = 0; i < n; i++)
         assert_true(fabs(again[i] - right[i]) < 1e-5 * g->whole[i]);
+    // whatever the working space holds; nought; what is no number
+    for (size_t i = 0; i < n; i++)
+        work[0][i] = work[1][i] = work[2][i] = NAN;
+    share = 0;
+    assert_true(silt_front_mend(front, &g->matrix, right, 1e-14, got, work, &share, &more));
+    assert_true(fabs(got[n - 1] - answer[n - 1]) < 1e-11 && share > 0 && share < 1e-4);
+    memset(again, 0, n * sizeof *again);
+    assert_true(silt_front_mend(front, &g->matrix, again, 1e-14, again, work, &share, &more));
+    assert_true(again[n / 2] == 0);
+    again[n / 2] = NAN;
+    share = 0;
+    assert_false(silt_front_mend(front, &g->matrix, again, 1e-3, got, work, &share, &more));
     silt_front_solve(front, right, got);
     memcpy(again, right, n * sizeof *right);
     silt_front_order(&front, &g->matrix, g->x);
