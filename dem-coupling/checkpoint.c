@@ -137,6 +137,7 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     c->left_count = r.number[4];
     c->left_mass = r.left;
     c->n_grain = c->n_last = (int)r.number[0];
+    c->sent_id = r.number[3];
     c->frozen.count = (int)r.number[1];
     SILT_RESERVE(c->grain, c->grain_capacity, c->n_grain);
     SILT_RESERVE(c->last, c->last_capacity, c->n_grain);

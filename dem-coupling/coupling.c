@@ -68,8 +68,8 @@ static silt_status coupling_shapes(silt_coupling *c, silt_error *err) {
     return SILT_OK;
 }
 
-// widths, radii, time step and everything else that the worker is told once; walls are owned by the caller
-static void coupling_measure(silt_coupling *c, const silt_coupling_def *def, silt_dem_def *dem, double (**wall)[4]) {
+// widths, radii, time step and everything else that the worker is told once
+static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     const silt_scene *scene = c->scene;
     const silt_contact_def *contact = &scene->contact;
     const silt_grains_def *grains = &scene->grains;
@@ -133,13 +133,13 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def, sil
         c->exchange.gravity[k] = scene->gravity[k];
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
-    *wall = silt_alloc((size_t)c->walls->count, sizeof **wall);
+    c->wall = silt_alloc((size_t)c->walls->count + 1, sizeof *c->wall);
     for (int i = 0; i < c->walls->count; i++)
         for (int k = 0; k < 2; k++) {
-            (*wall)[i][k] = c->walls->from[i][k];
-            (*wall)[i][2 + k] = c->walls->to[i][k];
+            c->wall[i][k] = c->walls->from[i][k];
+            c->wall[i][2 + k] = c->walls->to[i][k];
         }
-    *dem = (silt_dem_def){
+    c->dem_def = (silt_dem_def){
         .worker = def->worker,
         .log = def->log,
         .lo = {def->lo[0], def->lo[1]},
@@ -154,24 +154,35 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def, sil
         .body_friction = contact->body_friction,
         .step = c->step,
         .n_wall = c->walls->count,
-        .wall = (const double(*)[4]) * wall,
+        .wall = (const double(*)[4])c->wall,
         .max_radius = largest,
         .min_radius = smallest,
+        .no_contacts = !scene->bed.on || !scene->bed.deposition,
     };
 }
 
 // ---------------------------------------------------------------- grains
 
+// grains came, went or moved: what was made of them is out of date
+static void coupling_touched(silt_coupling *c) {
+    c->found = c->view->fresh = false;
+}
+
 static coupling_grain *coupling_append(silt_coupling *c, const double x[2], const double v[2], double radius) {
     SILT_RESERVE(c->grain, c->grain_capacity, c->n_grain + 1);
     coupling_grain *g = &c->grain[c->n_grain++];
+    coupling_touched(c);
     *g = (coupling_grain){.id = c->next_id++, .near = -1, .x = {x[0], x[1]}, .v = {v[0], v[1]}, .radius = radius};
     return g;
 }
 
 // takes grains that are gone out of the list
 static void coupling_compact(silt_coupling *c) {
+    if (c->n_gone == 0)
+        return;
     int kept = 0;
+    coupling_touched(c);
+    c->n_gone = 0;
     for (int i = 0; i < c->n_grain; i++)
         if (!c->grain[i].gone)
             c->grain[kept++] = c->grain[i];
@@ -186,6 +197,8 @@ static void coupling_forget(void *context, int64_t id) {
 
 static void coupling_take(silt_coupling *c, coupling_grain *g) {
     g->gone = true;
+    c->n_gone++;
+    coupling_touched(c);
     if (g->sent)
         coupling_forget(c, g->id);
 }
@@ -193,6 +206,8 @@ static void coupling_take(silt_coupling *c, coupling_grain *g) {
 static const silt_grain_state *coupling_grains(const silt_coupling *c) {
     coupling_view *w = c->view;
     int n = c->n_grain, count = 0;
+    if (w->fresh)
+        return &w->state;
     SILT_RESERVE(w->id, w->capacity[0], n);
     SILT_RESERVE(w->x, w->capacity[1], 3 * n);
     SILT_RESERVE(w->v, w->capacity[2], 3 * n);
@@ -228,6 +243,7 @@ static const silt_grain_state *coupling_grains(const silt_coupling *c) {
                                   .contacts = w->contacts,
                                   .on_bed = w->on_bed,
                                   .net_force = w->net};
+    w->fresh = true;
     return &w->state;
 }
 
@@ -328,12 +344,13 @@ static int coupling_locate(silt_coupling *c, coupling_grain *g, const silt_nodes
     return cell;
 }
 
-// grains into the exchange; @return false: mesh and grains stand where they stood, and so do their cells
+// grains into the exchange, once for the end of a step and the start of the next; @return false: mesh and grains stand where they
+// stood, and so do their cells
 static bool coupling_find(silt_coupling *c, const silt_nodes *nodes, const silt_mesh *mesh) {
     silt_exchange *e = &c->exchange;
-    bool stands = e->n_grain == c->n_grain && silt_exchange_stands(e, nodes, mesh), located = false;
-    for (int i = 0; i < c->n_grain && stands; i++)
-        stands = memcmp(e->grain[i].x, c->grain[i].x, sizeof e->grain[i].x) == 0 && e->grain[i].solid == c->grain[i].solid;
+    bool located = false;
+    if (c->found && silt_exchange_stands(e, nodes, mesh))
+        return false;
     SILT_RESERVE(e->grain, e->grain_capacity, c->n_grain);
     e->n_grain = c->n_grain;
     c->wet = false;
@@ -347,21 +364,22 @@ static bool coupling_find(silt_coupling *c, const silt_nodes *nodes, const silt_
         to->mass = g->mass;
         to->diameter = g->diameter;
         to->number = g->number;
-        if (!stands)
-            to->cell = coupling_locate(c, g, nodes, mesh, &located, to->weight);
+        to->cell = coupling_locate(c, g, nodes, mesh, &located, to->weight);
         c->wet = c->wet || to->cell >= 0;
     }
-    return !stands;
+    c->found = true;
+    return true;
 }
 
 static silt_status coupling_prepare(silt_coupling *c, const silt_nodes *nodes, const silt_mesh *mesh, double dt,
                                     const silt_drag **drag, silt_error *err) {
     *drag = NULL;
     coupling_compact(c);
-    c->wet = false;
     c->n_loaded = c->n_grain;
-    if (c->n_grain == 0 || nodes == NULL || mesh == NULL || mesh->n_cell == 0)
+    if (c->n_grain == 0 || nodes == NULL || mesh == NULL || mesh->n_cell == 0) {
+        c->wet = c->found = false;
         return SILT_OK;
+    }
     const bool moved = coupling_find(c, nodes, mesh);
     if (moved)
         c->exchange.placed = false;
@@ -402,6 +420,9 @@ static void coupling_exchanged(const silt_coupling *c, silt_exchanged *exchanged
 // spheres that LIGGGHTS has not heard of, in rising id: grains and frozen ones merged
 static void coupling_add(silt_coupling *c) {
     int n = 0, i = 0, k = 0;
+    if (c->sent_id == c->next_id)
+        return;
+    c->sent_id = c->next_id;
     SILT_RESERVE(c->add, c->add_capacity, c->n_grain + c->frozen.count);
     while (i < c->n_grain || k < c->frozen.count) {
         if (k == c->frozen.count || (i < c->n_grain && c->grain[i].id < c->frozen.sphere[k].id)) {
@@ -431,6 +452,10 @@ static void coupling_add(silt_coupling *c) {
         silt_dem_add(c->dem, n, c->add);
 }
 
+static void coupling_keep(silt_coupling *c) {
+    silt_dem_keep(c->dem);
+}
+
 static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     if (c->refused.count > 0)
         return silt_fail(err, c->refused.status, "%s", c->refused.text);
@@ -438,13 +463,17 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     // forces in the order of the last state, of spheres as they are in the slab
     coupling_compact(c);
     SILT_RESERVE(c->force, c->force_capacity, 3 * c->n_last);
-    for (int i = 0, k = 0; k < c->n_last; k++) {
-        double *f = c->force + 3 * k;
-        f[0] = f[1] = f[2] = 0.0;
-        while (i < c->n_grain && c->grain[i].id < c->last[k])
-            i++;
-        for (int d = 0; d < 2 && i < c->n_grain && c->grain[i].id == c->last[k]; d++)
-            f[d] = c->grain[i].force[d] * c->width * coupling_burden(c, &c->grain[i]);
+    memset(c->force, 0, 3 * (size_t)c->n_last * sizeof *c->force);
+    for (int i = 0, k = 0; i < c->n_grain; i++) {
+        coupling_grain *g = &c->grain[i];
+        for (int d = 0; d < 2; d++) {
+            g->old_x[d] = g->x[d];
+            g->old_v[d] = g->v[d];
+        }
+        while (k < c->n_last && c->last[k] < g->id)
+            k++;
+        for (int d = 0; d < 2 && k < c->n_last && c->last[k] == g->id; d++)
+            c->force[3 * k + d] = g->force[d] * c->width * coupling_burden(c, g);
     }
     for (int i = 0; i < c->bodies->count; i++)
         for (int k = 0; k < 3; k++) {
@@ -452,12 +481,6 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
             c->body_torque[3 * i + k] = c->bodies->body[i].torque[k] * c->width;
             c->body[i].old_v[k] = c->bodies->body[i].v[k];
         }
-    for (int i = 0; i < c->n_grain; i++)
-        for (int k = 0; k < 2; k++) {
-            c->grain[i].old_x[k] = c->grain[i].x[k];
-            c->grain[i].old_v[k] = c->grain[i].v[k];
-        }
-
     if (c->n_drop > 0)
         silt_dem_remove(c->dem, c->n_drop, c->drop);
     c->n_drop = 0;
@@ -511,32 +534,46 @@ static void coupling_receive(silt_coupling *c, coupling_grain *g, const silt_dem
     g->net = hypot(net[0], net[1]);
 }
 
+// a grain that LIGGGHTS no longer has: over an outlet, or lost
+static bool coupling_left_domain(const silt_coupling *c, const coupling_grain *g) {
+    const double ahead[2] = {g->old_x[0] + 2.0 * c->elapsed * g->v[0], g->old_x[1] + 2.0 * c->elapsed * g->v[1]};
+    return coupling_leaves(&c->scene->fluid, g->old_x, ahead, 4.0 * g->radius);
+}
+
+// nothing is changed before it is sure that no grain is lost
+static silt_status coupling_complete(const silt_coupling *c, const silt_dem_state *state, silt_error *err) {
+    for (int i = 0, k = 0; i < c->n_grain && state->n_grain != c->n_grain; i++) {
+        const coupling_grain *g = &c->grain[i];
+        while (k < state->n_grain && state->id[k] < g->id)
+            k++;
+        if ((k == state->n_grain || state->id[k] != g->id) && !coupling_left_domain(c, g))
+            return silt_fail(
+                err, SILT_FAILED,
+                "grain %lld vanished: last seen at (%g, %g) with the velocity (%g, %g) m/s and the radius %g m; it "
+                "crossed no outlet, so it went through a wall or out of the scene where nothing closes it",
+                (long long)g->id, g->old_x[0], g->old_x[1], g->v[0], g->v[1], g->radius);
+    }
+    return SILT_OK;
+}
+
 static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
     SILT_TRY(silt_dem_wait(c->dem, err));
     const silt_dem_state *state = silt_dem_state_now(c->dem);
-    const silt_fluid_def *fluid = &c->scene->fluid;
+    SILT_TRY(coupling_complete(c, state, err));
     c->contact[0] = c->contact[1] = 0.0;
+    coupling_touched(c);
     for (int i = 0, k = 0; i < c->n_grain; i++) {
         coupling_grain *g = &c->grain[i];
         while (k < state->n_grain && state->id[k] < g->id)
             k++;
         if (k < state->n_grain && state->id[k] == g->id) {
             coupling_receive(c, g, state, k);
-            if (coupling_leaves(fluid, g->old_x, g->x, 0.0))
+            if (coupling_leaves(&c->scene->fluid, g->old_x, g->x, 0.0))
                 coupling_leave(c, g);
-            continue;
+        } else {
+            g->sent = false;
+            coupling_leave(c, g);
         }
-
-        // LIGGGHTS no longer has it: over an outlet, or lost
-        double ahead[2] = {g->old_x[0] + 2.0 * c->elapsed * g->v[0], g->old_x[1] + 2.0 * c->elapsed * g->v[1]};
-        if (!coupling_leaves(fluid, g->old_x, ahead, 4.0 * g->radius))
-            return silt_fail(
-                err, SILT_FAILED,
-                "grain %lld vanished: last seen at (%g, %g) with the velocity (%g, %g) m/s and the radius %g m; it "
-                "crossed no outlet, so it went through a wall or out of the scene where nothing closes it",
-                (long long)g->id, g->old_x[0], g->old_x[1], g->v[0], g->v[1], g->radius);
-        g->sent = false;
-        coupling_leave(c, g);
     }
 
     SILT_RESERVE(c->last, c->last_capacity, state->n_grain);
@@ -559,15 +596,14 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
 // ---------------------------------------------------------------- open and close
 
 // all but the worker: scene, shapes, sizes
-static silt_status coupling_create(silt_coupling **coupling, const silt_coupling_def *def, silt_dem_def *dem,
-                                   double (**wall)[4], silt_error *err) {
+static silt_status coupling_create(silt_coupling **coupling, const silt_coupling_def *def, silt_error *err) {
     silt_coupling *c = *coupling = silt_alloc(1, sizeof *c);
     c->scene = def->scene;
     c->walls = def->walls;
-    c->next_id = 1;
+    c->next_id = c->sent_id = 1;
     c->view = silt_alloc(1, sizeof *c->view);
     SILT_TRY(coupling_shapes(c, err));
-    coupling_measure(c, def, dem, wall);
+    coupling_measure(c, def);
     return SILT_OK;
 }
 
@@ -589,6 +625,29 @@ static silt_status coupling_send_bodies(silt_coupling *c, silt_error *err) {
     return SILT_OK;
 }
 
+static silt_status coupling_open_dem(silt_coupling *c, silt_error *err) {
+    SILT_TRY(silt_dem_open(&c->dem, &c->dem_def, err));
+    return coupling_send_bodies(c, err);
+}
+
+static silt_status coupling_recover(silt_coupling *c, silt_error *err) {
+    if (!silt_dem_own_fault(c->dem))
+        return SILT_FAILED;
+    silt_dem_close(&c->dem);
+    c->dem_def.append = true;
+    SILT_TRY(coupling_open_dem(c, err));
+    // it is told of everything anew
+    coupling_compact(c);
+    for (int i = 0; i < c->n_grain; i++)
+        c->grain[i].sent = false;
+    for (int k = 0; k < c->frozen.count; k++)
+        c->frozen.sphere[k].sent = false;
+    c->sent_id = 0;
+    c->n_drop = c->n_last = 0;
+    SILT_TRY(coupling_start(c, 0, err));
+    return coupling_finish(c, err);
+}
+
 static void coupling_listed(silt_coupling *c) {
     for (int i = 0; i < c->scene->grains.n_grain; i++) {
         const silt_grain_def *def = &c->scene->grains.grain[i];
@@ -601,14 +660,10 @@ static void coupling_listed(silt_coupling *c) {
 }
 
 static silt_status coupling_open(silt_coupling **coupling, const silt_coupling_def *def, silt_error *err) {
-    silt_dem_def dem;
-    double(*wall)[4] = NULL;
-    silt_status status = coupling_create(coupling, def, &dem, &wall, err);
+    silt_status status = coupling_create(coupling, def, err);
     silt_coupling *c = *coupling;
     if (status == SILT_OK)
-        status = silt_dem_open(&c->dem, &dem, err);
-    if (status == SILT_OK)
-        status = coupling_send_bodies(c, err);
+        status = coupling_open_dem(c, err);
     if (status != SILT_OK)
         goto done;
 
@@ -620,7 +675,6 @@ static silt_status coupling_open(silt_coupling **coupling, const silt_coupling_d
     if (status == SILT_OK)
         status = coupling_finish(c, err);
 done:
-    free(wall);
     if (status != SILT_OK)
         coupling_close(coupling);
     return status;
@@ -631,6 +685,7 @@ static void coupling_close(silt_coupling **coupling) {
     if (c == NULL)
         return;
     silt_dem_close(&c->dem);
+    free(c->wall);
     for (int i = 0; i < c->bodies->count; i++) {
         silt_outline_clear(&c->body[i].shape);
         silt_clump_clear(&c->body[i].clump);
@@ -685,14 +740,12 @@ static silt_status coupling_save(silt_coupling *c, silt_store *store, silt_error
 
 static silt_status coupling_load_state(silt_coupling **coupling, const silt_coupling_def *def, silt_store *store,
                                        silt_error *err) {
-    silt_dem_def dem;
-    double(*wall)[4] = NULL;
-    silt_status status = coupling_create(coupling, def, &dem, &wall, err);
+    silt_status status = coupling_create(coupling, def, err);
+    silt_coupling *c = *coupling;
     if (status == SILT_OK)
-        status = silt_checkpoint_load(*coupling, store, err);
+        status = silt_checkpoint_load(c, store, err);
     if (status == SILT_OK)
-        status = silt_dem_load(&(*coupling)->dem, &dem, store, err);
-    free(wall);
+        status = silt_dem_load(&c->dem, &c->dem_def, store, err);
     if (status != SILT_OK)
         coupling_close(coupling);
     return status;
@@ -712,8 +765,10 @@ const silt_coupling_type silt_coupling_dem = {
     .release = coupling_release,
     .deposit = coupling_deposit,
     .bed_changed = coupling_bed_changed,
+    .keep = coupling_keep,
     .start = coupling_start,
     .finish = coupling_finish,
+    .recover = coupling_recover,
     .left = coupling_left,
     .save = coupling_save,
     .load_state = coupling_load_state,

@@ -13,6 +13,7 @@ struct silt_dem {
     silt_dem_def def; // strings and walls owned
     dem_link link;
     bool begun; // bodies are in the worker
+    bool keep;  // the next run may do without a set-up
     // spheres in the worker, rising id and tag
     int n_live, cap_live;
     struct dem_live {
@@ -50,6 +51,10 @@ const silt_dem_state *silt_dem_state_now(const silt_dem *dem) {
 
 int silt_dem_process(const silt_dem *dem) {
     return dem->link.pid;
+}
+
+bool silt_dem_own_fault(const silt_dem *dem) {
+    return !dem->link.failed || dem->link.gave_up;
 }
 
 static bool dem_finite(int n, const double *value) {
@@ -169,6 +174,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->max_radius = def->max_radius;
     s->min_radius = def->min_radius;
     s->n_wall = def->n_wall;
+    s->no_contacts = def->no_contacts;
     s->n_body = bodies ? dem->n_free : 0;
     s->n_body_sphere = bodies ? dem->n_free_sphere : 0;
     s->n_remove = s->n_add = s->n_force = 0;
@@ -204,7 +210,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
 silt_status silt_dem_open(silt_dem **dem, const silt_dem_def *def, silt_error *err) {
     silt_dem *d = NULL;
     *dem = NULL;
-    silt_status status = dem_create(&d, def, false, err);
+    silt_status status = dem_create(&d, def, def->append, err);
     if (status == SILT_OK)
         status = dem_tell(d, DEM_OPEN, 0, err);
     if (status == SILT_OK)
@@ -524,6 +530,8 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         n_grain += dem->live[i].kind == DEM_GRAIN;
     dem_shared *s = dem->link.shared;
     s->n_step = n_step;
+    s->keep = dem->keep;
+    dem->keep = false;
     s->n_remove = dem->n_remove;
     s->n_add = dem->n_add + n_fixed;
     s->n_force = force ? dem->state.n_grain : 0;
@@ -544,6 +552,10 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         }
     }
     return dem_link_send(&dem->link, DEM_RUN, err);
+}
+
+void silt_dem_keep(silt_dem *dem) {
+    dem->keep = true;
 }
 
 silt_status silt_dem_wait(silt_dem *dem, silt_error *err) {

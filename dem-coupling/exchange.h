@@ -10,6 +10,7 @@
 #ifndef SILT_EXCHANGE_H
 #define SILT_EXCHANGE_H
 
+#include "drag.h"
 #include "kernel.h"
 
 typedef struct silt_exchange_grain {
@@ -22,9 +23,8 @@ typedef struct silt_exchange_grain {
     double contact[2]; // N/m, of contacts in the last step
     int cell;          // of the water's mesh, -1: not in the water
     double weight[3];  // barycentric, in that cell
-    // results
+    // results of load
     double water[2];    // m/s, the water's velocity at the grain
-    double drag_factor; // kg/(s m), beta
     double effective;   // kg/(s m), beta_eff
     double free[2];     // m/s, v_free of the last update
     double pressure[2]; // N/m, force of the pressure gradient
@@ -38,6 +38,23 @@ typedef struct silt_exchange_totals {
     double water[2];    // of drag on the water: sum over nodes of push - coefficient u; minus drag to rounding
     double size;        // sum over grains of the magnitudes of both parts
 } silt_exchange_totals;
+
+/** a cell of the water near to grains */
+typedef struct exchange_cell {
+    int at[3];    // corners, among the nodes that are looked at
+    double least; // m2, twice the area below which the cell counts as at the start of the step
+} exchange_cell;
+
+/** eight grains in the water: what a step's updates read and write of them */
+typedef struct exchange_group {
+    int place[DRAG_GROUP][3];      // of the corners of the grain's cell, in the kernel's order
+    double weight[DRAG_GROUP][3];
+    double number[DRAG_NUMBERS][DRAG_GROUP]; // of the drag law
+    double pace[DRAG_GROUP];                 // s m/kg, dt/m
+    double solid[DRAG_GROUP], v[2][DRAG_GROUP];
+    double start[2][DRAG_GROUP];             // m/s, v_free but for the pressure
+    double factor[DRAG_GROUP], effective[DRAG_GROUP], free[2][DRAG_GROUP];
+} exchange_group;
 
 typedef struct silt_exchange {
     // given once
@@ -59,21 +76,26 @@ typedef struct silt_exchange {
     double dt;
     int n_node;
     double *solid, *coefficient, *push, *source; // owned, per node
-    double *read, *give;                         // owned, fields through the kernel, node by node
-    double *area;                                        // owned, per cell, at the middle of the step
-    double (*gradient)[3][2];                            // owned, per cell
+    double *read, *give;                         // owned, fields through the kernel, in its order
+    struct exchange_cell *cell;                          // owned, cells near to a node that the kernel holds
+    int n_wet, *wet;                                     // owned, grains in the water
+    int n_group;
+    struct exchange_group *group; // owned, of those
     uint8_t *chosen;                             // owned, per node: the kernel holds it
     double *placed_x;                            // owned, 2 per node, positions at the last place
     bool placed;
     int64_t revision; // of the mesh then
     int n_placed_cell, *bin; // owned, grid around the grains
-    double *seen;            // owned, velocity and pressure of the last update
-    int node_capacity[9], cell_capacity[2], bin_capacity;
+    int *index;              // owned, per node of the mesh: among those that are looked at
+    int n_look, *look;       // owned, nodes that an update looks at: the kernel's in its order, then others of their cells
+    double (*rest)[2];       // owned, m, of those, positions at the start of the step
+    double (*middle)[2];     // owned, m, at its middle
+    double (*seen)[3];       // owned, of those, velocity and pressure of the last iterate
+    double (*spare)[3];      // owned, room for another
+    double *volume, *flow;   // owned, of those, m2 and m2/s
+    bool steady;             // the last update changed little: it stands for the rest of the step
+    int node_capacity[9], look_capacity[7], cell_capacity, bin_capacity, wet_capacity, group_capacity;
 } silt_exchange;
-
-/** F/(u - v) in kg/s of one grain of diameter d in water of solid fraction `solid`, at the relative speed w. Above a
- * solid fraction of 0.75 the formulas see 0.75. */
-double silt_drag_factor(silt_drag_law law, double density, double viscosity, double d, double solid, double w);
 
 /** Spreads the grains over the water around them, their place in the mesh (cell, weight) given: the solid fraction. */
 silt_status silt_exchange_place(silt_exchange *exchange, const silt_nodes *nodes, const silt_mesh *mesh, silt_error *err);

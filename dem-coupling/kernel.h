@@ -6,21 +6,19 @@
 #ifndef SILT_KERNEL_H
 #define SILT_KERNEL_H
 
-#include "pfem.h"
-
-enum { KERNEL_FIELDS = 6 };
+#include "nested.h"
 
 typedef struct silt_kernel {
-    int n_node, *node;        // owned, the mesh's nodes that the kernel holds, rising
-    int *local;               // owned, per node of the mesh: place in node, -1: none
+    int n_node, *node;        // owned, the mesh's nodes that the kernel holds, in its own order
+    int *place;               // owned, per node of the mesh: place in node, n_node: it is none of them
     int n_near, *near;        // owned, the mesh's cells that touch one of them, rising
     double *volume;           // owned, m2 per node of the mesh, a third of the cells around it; 0 without a cell
-    double *area;             // owned, m2 per cell of the mesh, of those in near; so is gradient
-    double (*gradient)[3][2]; // owned, 1/m, of the cell's three shape functions
+    double *area;             // owned, m2 per cell of the mesh, of those in near; so is edge
+    double (*edge)[3];        // owned, m2, b^2/4 K between the corners across from each
+    double *diagonal;         // owned, m2, of M per node of the mesh
     double *work;             // owned, of a solve
-    int n_panel, *panel;      // owned, first columns of groups of columns of the factor
-    int work_capacity, panel_capacity, node_capacity[3], cell_capacity[3];
-    struct silt_kernel_factor *factor; // owned
+    int work_capacity, node_capacity[4], cell_capacity[3];
+    silt_nested *nested; // owned
 } silt_kernel;
 
 /** Factors H of the chosen nodes (1 in `chosen`, one per node of the mesh) for the mesh at positions x (2 per node) and
@@ -28,9 +26,11 @@ typedef struct silt_kernel {
  * passes from the others, and H 1 = M 1 all the same. Errors (SILT_FAILED): a cell without area, naming it. */
 silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const double *x, const uint8_t *chosen,
                               double width, silt_error *err);
-/** H^-1 applied in place to n_field fields, at most KERNEL_FIELDS, stored node by node of the mesh; the
- * values at nodes that were not chosen stay */
-void silt_kernel_solve(silt_kernel *kernel, int n_field, double *field);
+/** H^-1 applied in place to n_field fields, 4 or NESTED_FIELDS, stored node by node in the kernel's order, with a row of finite
+ * numbers behind the last */
+void silt_kernel_solve(const silt_kernel *kernel, int n_field, double *field);
+/** the same for one field, stored by the nodes of the mesh; the values at nodes that were not chosen stay */
+void silt_kernel_smooth(silt_kernel *kernel, double *field);
 void silt_kernel_clear(silt_kernel *kernel);
 
 #endif

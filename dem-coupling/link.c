@@ -74,6 +74,7 @@ silt_status dem_link_give_up(dem_link *link, silt_error *err, const char *format
     va_end(list);
     memset(&link->why, 0, sizeof link->why);
     silt_fail(&link->why, SILT_FAILED, "%s", text);
+    link->gave_up = true;
     return link_broken(link, err);
 }
 
@@ -86,7 +87,8 @@ static silt_status link_ended(dem_link *link, silt_error *err) {
     memset(&link->why, 0, sizeof link->why);
     link->shared->text[sizeof link->shared->text - 1] = 0;
     link_last_line(link, line, sizeof line);
-    if (link->shared->text[0])
+    link->gave_up = link->shared->text[0] != 0;
+    if (link->gave_up)
         silt_fail(&link->why, SILT_FAILED, "the LIGGGHTS worker (pid %d) gave up: %s (log: %s)", link->pid,
                   link->shared->text, log);
     else if (WIFSIGNALED(status))

@@ -18,6 +18,7 @@ typedef struct dem_link {
     dem_shared *shared;          // mapped, owned
     bool open, busy;             // busy: an instruction is under way
     bool failed;                 // and why: every later call answers the same
+    bool gave_up;                // it failed at what it was told to do; nobody ended it from outside
     silt_error why;
 } dem_link;
 

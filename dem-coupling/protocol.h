@@ -53,10 +53,11 @@ typedef struct dem_shared {
     double lo[2], hi[2], period, gravity[2];
     double youngs_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
     double step, max_radius, min_radius;
-    int resume;
+    int resume, no_contacts;
     // lengths of the sections
     int n_wall, n_body, n_body_sphere, n_remove, n_add, n_force, max_grain;
     int n_step;
+    int keep; // 1: this run may go on from the last one's end
     // answer
     int n_grain;
     double seconds, cpu; // that the substeps took, on the wall and in CPU time, without what stands before and after them

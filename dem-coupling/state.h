@@ -29,6 +29,7 @@ typedef struct coupling_grain {
 /** what grains() shows: borrowed by the caller, remade when it is stale */
 typedef struct coupling_view {
     silt_grain_state state;
+    bool fresh; // shows the grains as they are
     int capacity[9], map_capacity;
     int64_t *id;
     double *x, *v, *omega, *radius, *mass, *net;
@@ -47,13 +48,17 @@ struct silt_coupling {
     const silt_scene *scene; // borrowed
     const silt_walls *walls; // borrowed
     silt_dem *dem;           // owned
+    silt_dem_def dem_def;    // what it was opened with; its strings are borrowed
+    double (*wall)[4];       // owned
     double width;            // m, accounting width: spheres stand for what is in this width of the slab
     double step;             // s, of the discrete elements
     double parcel;           // m, usual radius of a parcel, 0 without bed
     double crust;            // m, radius of the frozen spheres along the bed
     int64_t next_id;
-    int n_grain, grain_capacity;
-    coupling_grain *grain; // owned, rising id
+    int64_t sent_id; // LIGGGHTS was told of all that came before it
+    int n_grain, grain_capacity, n_gone; // gone ones are still in the list
+    coupling_grain *grain;               // owned, rising id
+    bool found;                          // the exchange has these grains where they are
     coupling_view *view;   // owned
     silt_frozen frozen;
     int n_drop, drop_capacity;

@@ -57,9 +57,15 @@ typedef struct silt_coupling_type {
     void (*deposit)(silt_coupling *coupling, int grain);  // grain: index into grains(); becomes a frozen sphere, queued
     /** the bed's surface changed (bed->revision): the frozen spheres along it are brought up to date, queued */
     void (*bed_changed)(silt_coupling *coupling, const silt_bed *bed);
+    /** The next start need not set the discrete elements up anew. Such set-ups must come at the same steps whatever happens to the
+     * run, and at every step that begins from a checkpoint. */
+    void (*keep)(silt_coupling *coupling);
     /** Runs n substeps: start returns at once, finish waits and refreshes grains() and bodies(). */
     silt_status (*start)(silt_coupling *coupling, int n, silt_error *err);
     silt_status (*finish)(silt_coupling *coupling, silt_error *err);
+    /** After a finish that failed, before the next prepare: new discrete elements with grains and bodies as they were at the start;
+     * contacts forget their tangential springs. @return SILT_FAILED when they were ended from outside: that is no fault of the step */
+    silt_status (*recover)(silt_coupling *coupling, silt_error *err);
     /** sediment that crossed an outlet of the scene from left to right since the start: kg per m of width, grains */
     void (*left)(const silt_coupling *coupling, double *mass, int64_t *count);
     silt_status (*save)(silt_coupling *coupling, silt_store *store, silt_error *err);

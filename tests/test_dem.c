@@ -613,6 +613,63 @@ static void test_checkpoint(void **unused) {
     unlink(path);
 }
 
+// Runs that go on from each other without a set-up: as one run, to the bit; loads that change arrive whole
+static void test_keep(void **unused) {
+    (void)unused;
+    const double walls[3][4] = {{-0.1, 0.3, -0.1, -0.02}, {-1, -0.02, 1, -0.02}, {0.1, -0.02, 0.12, 0.3}};
+    silt_dem_def def = plain();
+    uint64_t print[2];
+    int touching = 0;
+    def.gravity[1] = -9.81;
+    def.restitution = 0.4;
+    def.rolling_friction = 0.1;
+    def.n_wall = 3;
+    def.wall = walls;
+    for (int cut = 0; cut < 2; cut++) {
+        silt_dem *dem = NULL;
+        OK(silt_dem_open(&dem, &def, &error));
+        for (int i = 0; i < 24; i++) {
+            silt_dem_sphere g = grain(i, -0.07 + 0.0195 * (i % 8), 0.01 + 0.021 * (i / 8) + (i % 8 > 3) * 0.1);
+            g.radius = 0.0095;
+            silt_dem_add(dem, 1, &g);
+        }
+        const silt_dem_state *s = advance(dem, 30000, NULL, NULL, NULL);
+        for (int k = 0; k < (cut ? 40 : 1); k++) {
+            if (k > 0)
+                silt_dem_keep(dem);
+            s = advance(dem, cut ? 20 : 800, NULL, NULL, NULL);
+        }
+        print[cut] = fingerprint(s);
+        for (int i = 0; i < s->n_grain; i++)
+            touching += s->contacts[i];
+        silt_dem_close(&dem);
+    }
+    print_message("runs that go on: %d contacts\n", touching / 2);
+    assert_true(touching > 40);
+    assert_true(print[0] == print[1]);
+
+    // a grain of its own: momentum is the sum of force and time, the place that of a parabola a run
+    def.gravity[1] = 0;
+    silt_dem *dem = NULL;
+    OK(silt_dem_open(&dem, &def, &error));
+    silt_dem_sphere g = grain(1, 0.3, 0.5);
+    silt_dem_add(dem, 1, &g);
+    double x = 0.3, v = 0;
+    for (int k = 0; k < 30; k++) {
+        const double force[3] = {1e-2 * sin(3 * k), 0, 0}, t = 20 * def.step;
+        if (k > 0)
+            silt_dem_keep(dem);
+        else
+            advance(dem, 0, NULL, NULL, NULL);
+        const silt_dem_state *s = advance(dem, 20, force, NULL, NULL);
+        x += v * t + 0.5 * force[0] / mass * t * t;
+        v += force[0] / mass * t;
+        near(s->v[0], v, 1e-14, "velocity under a load that changes");
+        near(s->x[0], x, 1e-14, "place under a load that changes");
+    }
+    silt_dem_close(&dem);
+}
+
 // no sphere at all, but a past
 static void test_empty_checkpoint(void **unused) {
     (void)unused;
@@ -778,6 +835,7 @@ int main(void) {
         cmocka_unit_test(test_bounce),     cmocka_unit_test(test_sliding),     cmocka_unit_test(test_body_impulse),
         cmocka_unit_test(test_body_rests), cmocka_unit_test(test_body_slides), cmocka_unit_test(test_edits),
         cmocka_unit_test(test_deposit),    cmocka_unit_test(test_checkpoint),  cmocka_unit_test(test_empty_checkpoint),
+        cmocka_unit_test(test_keep),
         cmocka_unit_test(test_failures),   cmocka_unit_test(test_orphan),
     };
     return cmocka_run_group_tests_name("dem", tests, NULL, NULL);

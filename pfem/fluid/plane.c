@@ -1,10 +1,7 @@
 // the pressure system in two dimensions: rows of G and couplings of L, summed and factored front by front
-#include <omp.h>
-
 #include "front.h"
+#include "parallel.h"
 #include "plane.h"
-
-#define PLANE_SHARED 20000 // nodes from which several threads are worth being woken for a solve
 
 struct silt_plane {
     silt_front *front;    // owned
@@ -101,7 +98,7 @@ silt_status silt_plane_factor(silt_plane **plane, const silt_fluid *f, const sil
     }
     p->matrix = (silt_front_matrix){.n = mesh->n_node, .neighbour_start = mesh->neighbour_start, .neighbour = mesh->neighbour,
                                       .row = p->star, .weight = p->weight, .diagonal = p->own, .whole = p->whole,
-                                    .threads = mesh->n_node < PLANE_SHARED ? 1 : omp_get_max_threads()};
+                                    .threads = silt_threads(mesh->n_node)};
     if (!p->front || p->revision != mesh->revision)
         SILT_CLOCKED(analyse, silt_front_order(&p->front, &p->matrix, s->nodes->x));
     p->revision = mesh->revision;

@@ -1,8 +1,8 @@
 // the time loop, and what stands before and after it
-#include <omp.h>
 #include <signal.h>
 #include <unistd.h>
 
+#include "parallel.h"
 #include "run.h"
 
 #define PRESSURE_SLOPE 0.2 // largest share by which output carries the pressure on to the end of the step
@@ -126,43 +126,6 @@ static void water_restore(silt_run *run) {
     silt_stiff_forget(run->fluid.stiff);
 }
 
-// force and torque of the water on body b: the reaction of its nodes, turned round. @return false: it is dry
-static bool water_on_body(const silt_run *run, int b, double force[2], double *torque) {
-    const struct silt_body *body = &silt_coupling_dem.bodies(run->coupling)->body[b];
-    bool wet = false;
-    force[0] = force[1] = *torque = 0;
-    for (int i = 0; i < run->nodes.count; i++) {
-        if (run->nodes.kind[i] != NODE_BODY || run->nodes.owner[i] != b || !run->mesh.wet[i])
-            continue;
-        const double fx = -run->fluid.reaction[2 * i], fy = -run->fluid.reaction[2 * i + 1];
-        force[0] += fx;
-        force[1] += fy;
-        *torque += (run->nodes.x[2 * i] - body->x[0]) * fy - (run->nodes.x[2 * i + 1] - body->x[1]) * fx;
-        wet = true;
-    }
-    return wet;
-}
-
-// a force that would carry a free body over a cell from rest, or turn it as far, is none: the water's step has failed. LIGGGHTS
-// would lose the body without a word.
-static silt_status loads_sane(const silt_run *run, silt_error *err) {
-    const silt_scene *scene = run->scene;
-    const silt_body_state *bodies = run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
-    for (int b = 0; bodies && b < bodies->count; b++) {
-        const struct silt_body *body = &bodies->body[b];
-        double force[2], torque, reach = 0;
-        if (scene->body[b].motion == MOTION_FIXED || !water_on_body(run, b, force, &torque))
-            continue;
-        for (int k = 0; k < body->n_point; k++)
-            reach = silt_max(reach, hypot(body->outline[2 * k], body->outline[2 * k + 1]));
-        const double way = silt_square(run->dt) * (silt_length(2, force) / body->mass + fabs(torque) * reach / body->inertia);
-        if (!(way < scene->fluid.size))
-            return silt_fail(err, SILT_FAILED, "the water's force (%.3g, %.3g) N and torque %.3g N m would throw body '%s' at (%g, %g) over %.2g cells in a step",
-                             force[0], force[1], torque, scene->body[b].name, body->x[0], body->x[1], way / scene->fluid.size);
-    }
-    return SILT_OK;
-}
-
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
     const silt_scene *scene = run->scene;
     water_keep(run);
@@ -184,7 +147,7 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         status = silt_fluid_step(&run->fluid, &step, err);
         silt_clock_to(CLOCK_rest);
         if (status == SILT_OK)
-            status = loads_sane(run, err);
+            status = silt_run_loads_sane(run, err);
         if (status == SILT_OK)
             return SILT_OK;
         water_restore(run);
@@ -206,33 +169,6 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         } else
             run->dt *= 0.5;
     }
-}
-
-// What the water does to bodies. The water saw the body's last change of speed
-// as its acceleration and answers with its added mass, and with theta below 1 it rings on: the body takes only the share of
-// a new force that leaves this loop stable whatever its contacts do; a steady force comes through whole. before: last
-// step, s
-static void load_bodies(silt_run *run, double before) {
-    silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
-    const double rho = run->scene->fluid.density, theta = run->scene->fluid.theta;
-    const double ratio = (before > 0 ? silt_clamp(before / run->dt, 1, 20) : 1) / theta;
-    const double most = silt_max(2 - 1 / theta, 0.1); // half of what the linear loop bears
-    for (int b = 0; b < bodies->count; b++) {
-        struct silt_body *body = &bodies->body[b];
-        double force[2], torque, reach = 0;
-        const bool wet = water_on_body(run, b, force, &torque);
-        for (int k = 0; k < body->n_point; k++)
-            reach = silt_max(reach, hypot(body->outline[2 * k], body->outline[2 * k + 1]));
-        // added mass and inertia: those of the disc around it
-        const double added = rho * M_PI * silt_square(reach), turned = 0.25 * added * silt_square(reach);
-        const double share = most / (1 + ratio * added / body->mass), twist = most / (1 + ratio * turned / body->inertia);
-        for (int d = 0; d < 2; d++)
-            body->force[d] = wet ? body->force[d] + share * (force[d] - body->force[d]) : 0;
-        body->torque[2] = wet ? body->torque[2] + twist * (torque - body->torque[2]) : 0;
-    }
-    SILT_RESERVE(run->body_before, run->body_before_capacity, bodies->count + 1);
-    memcpy(run->body_before, bodies->body, (size_t)bodies->count * sizeof *bodies->body);
-    run->n_body_before = bodies->count;
 }
 
 // a run that has lost its footing says so: steps that shrink without end, water that multiplies or vanishes
@@ -259,22 +195,30 @@ static silt_status step_sane(const silt_run *run, double wanted, silt_error *err
     return SILT_OK;
 }
 
-// what the discrete elements say, with the step and the speed and load of every body that could be the cause
-static silt_status grains_failed(const silt_run *run, silt_status status, silt_error *err) {
-    if (!err)
-        return status;
-    char why[sizeof err->text];
-    snprintf(why, sizeof why, "%s", err->text);
-    *err = (silt_error){0};
-    silt_fail(err, status, "step %lld at t = %.9g s, dt = %.3g s: %s", (long long)run->step + 1, run->time, run->dt, why);
-    const silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
-    for (int b = 0; b < bodies->count; b++) {
-        const struct silt_body *body = &bodies->body[b];
-        const size_t used = strlen(err->text);
-        snprintf(err->text + used, sizeof err->text - used, "\nbody '%s' was at (%g, %g) with the velocity (%.3g, %.3g) m/s; force of the water (%.3g, %.3g) N",
-                 run->scene->body[b].name, body->x[0], body->x[1], body->v[0], body->v[1], body->force[0], body->force[1]);
-    }
-    return status;
+// The discrete elements failed: the step is cut as when the water's does, and tried again with what was worn off and released left so.
+// @return false: there is nothing more to try, or no fault of the step
+static bool grains_again(silt_run *run, int64_t *n, int attempt, silt_error *err) {
+    silt_error late = {0};
+    if (*n <= 1 || attempt >= run->scene->time.retries || silt_coupling_dem.recover(run->coupling, &late) != SILT_OK)
+        return false;
+    if (err)
+        *err = (silt_error){0};
+    if (run->scene->fluid.on)
+        water_restore(run);
+    *n /= 2;
+    const double dt = (double)*n * silt_coupling_dem.step(run->coupling);
+    run->wear_ahead += run->dt - dt;
+    run->dt = dt;
+    run->summary.retries++;
+    return true;
+}
+
+static void bed_step(silt_run *run) {
+    const double dt = silt_max(run->dt - run->wear_ahead, 0);
+    run->wear_ahead = silt_max(run->wear_ahead - run->dt, 0);
+    if (run->scene->fluid.on && dt > 0)
+        silt_bed_wear(&run->bed, run->scene, &run->nodes, &run->mesh, &run->locator, dt);
+    silt_run_release(run);
 }
 
 static silt_status run_step(silt_run *run, silt_error *err) {
@@ -293,41 +237,34 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     SILT_RESERVE(run->x_old, run->x_old_capacity, D * (run->nodes.count + 1));
     if (run->nodes.count)
         memcpy(run->x_old, run->nodes.x, (size_t)(D * run->nodes.count) * sizeof(double));
-    silt_status solved = SILT_OK;
-    if (scene->fluid.on)
-        solved = water_step(run, &n, err);
-    else if (run->coupling)
-        solved = silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err);
-    if (solved != SILT_OK) {
-        run->dt = before;
-        return solved;
-    }
-    run->whole = false;
-
-    if (scene->bed.on)
-        SILT_CLOCKED(bed, {
-            if (scene->fluid.on)
-                silt_bed_wear(&run->bed, scene, &run->nodes, &run->mesh, &run->locator, run->dt);
-            silt_run_release(run);
-        });
-    if (run->coupling) {
-        silt_status status = SILT_OK;
+    silt_status status = SILT_OK;
+    for (int attempt = 0;; attempt++) {
+        if (scene->fluid.on)
+            status = water_step(run, &n, err);
+        else if (run->coupling)
+            status = silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err);
+        if (status != SILT_OK) {
+            run->dt = attempt == 0 ? before : run->dt;
+            return status;
+        }
+        run->whole = false;
+        if (scene->bed.on && attempt == 0)
+            SILT_CLOCKED(bed, bed_step(run));
+        if (!run->coupling)
+            break;
         SILT_CLOCKED(coupling, {
-            silt_run_place(run);
-            load_bodies(run, before);
-            silt_nodes moving = run->nodes; // with the velocity that the drag was solved with
-            moving.v = run->fluid.w ? run->fluid.w : run->nodes.v;
-            silt_coupling_dem.load(run->coupling, &moving, &run->mesh, run->dt);
-            status = silt_coupling_dem.start(run->coupling, (int)n, err);
-            if (status == SILT_OK)
-                status = silt_coupling_dem.finish(run->coupling, err);
+            if (attempt == 0)
+                silt_run_place(run);
+            status = silt_run_grains(run, (int)n, before, attempt > 0, err);
         });
-        if (status != SILT_OK)
-            return grains_failed(run, status, err);
-        if (scene->bed.on)
-            SILT_CLOCKED(bed, status = silt_run_deposit(run, err));
-        SILT_TRY(status);
+        if (status == SILT_OK)
+            break;
+        if (!grains_again(run, &n, attempt, err))
+            return silt_run_grains_failed(run, status, err);
     }
+    if (run->coupling && scene->bed.on)
+        SILT_CLOCKED(bed, status = silt_run_deposit(run, err));
+    SILT_TRY(status);
     if (scene->fluid.on) {
         silt_wall_forces(&run->walls, &run->nodes, &run->mesh, run->fluid.reaction, run->wall_force);
         SILT_TRY(silt_run_move(run, err));
@@ -456,6 +393,7 @@ void silt_run_free(silt_run *run) {
     free(run->grown);
     free(run->grown_area);
     free(run->body_before);
+    free(run->body_load);
     free(run->x_old);
     free(run->p_old);
     free(run->p_shown);
@@ -479,8 +417,7 @@ static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_
     run->started = silt_seconds();
     silt_clock_reset();
     run->summary.status = "running";
-    if (def->threads > 0)
-        omp_set_num_threads(def->threads);
+    silt_threads_ask(def->threads);
     run->nodes.dim = run->mesh.dim = scene->dimension;
     run->mesh.period[0] = scene->period[1] - scene->period[0];
     run->gauge = silt_alloc((size_t)silt_gauges_count(scene) + 1, sizeof *run->gauge);
@@ -513,7 +450,7 @@ static silt_status run_loop(silt_run *run, silt_error *err) {
         if (status != SILT_OK)
             break;
         const bool frame = run->tick == 0 && run->offset == 0;
-        if (run_asked) {
+        if (run_asked && silt_run_set_up_due(run)) {
             run_asked = 0;
             status = checkpoint_write(run, err);
             if (status == SILT_OK && run_stop)

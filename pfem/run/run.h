@@ -56,6 +56,7 @@ struct silt_run {
     int grown_area_capacity;
     double *grown_area;    // owned
     int64_t bed_revision;  // that nodes and coupling know
+    double wear_ahead;     // s, that the bed was worn for and the water has still to go: of steps cut after that
 
     // clocks: time = frame * output + offset, with offset = tick * step of the coupling when there is one
     int64_t step, frame, tick;
@@ -77,6 +78,8 @@ struct silt_run {
 
     int n_body_before, body_before_capacity;
     struct silt_body *body_before; // owned, poses at the start of the step
+    int body_load_capacity;
+    double (*body_load)[3];        // owned, N and N m per m, force and torque of the step before
     double *x_old;   // owned, 2 per node, positions at the start of the step
     double *v_old, *debt_old; // owned, 2 and 1 per node, velocities and debts at the start of the step
     int *wall_before;  // owned, first wall of every node before contact
@@ -100,6 +103,16 @@ silt_status silt_run_open(silt_run *run, const silt_scene *scene, const silt_run
 /** One step of the time loop with its row, and its frame if it is due; its clocks are there to be read until the next one begins. */
 silt_status silt_run_advance(silt_run *run, silt_error *err);
 void silt_run_free(silt_run *run);
+
+// grains.c --------------------------------------------------------------------------------------------
+/** true where the discrete elements are set up anew: checkpoints are taken at such places only */
+bool silt_run_set_up_due(const silt_run *run);
+/** SILT_FAILED: the water's force on a body cannot be. */
+silt_status silt_run_loads_sane(const silt_run *run, silt_error *err);
+/** Grains and bodies over n of their steps, under the water's forces. before: last step, s; again: the step was cut. */
+silt_status silt_run_grains(silt_run *run, int n, double before, bool again, silt_error *err);
+/** what the discrete elements say of their failure, with the step and the bodies. @return status */
+silt_status silt_run_grains_failed(const silt_run *run, silt_status status, silt_error *err);
 
 // ledger.c --------------------------------------------------------------------------------------------
 /** volume, mass, momentum, energy and sediment of the state, and their errors so far */

@@ -8,6 +8,7 @@
     X("run/tick", STORE_LONG, run->tick)                                                                               \
     X("run/offset", STORE_DOUBLE, run->offset)                                                                         \
     X("run/time", STORE_DOUBLE, run->time)                                                                             \
+    X("run/wear_ahead", STORE_DOUBLE, run->wear_ahead)                                                                 \
     X("run/dt", STORE_DOUBLE, run->dt)                                                                                 \
     X("run/next_id", STORE_LONG, run->nodes.next_id)                                                                   \
     X("mesh/revision", STORE_LONG, run->mesh.revision)                                                                 \
