@@ -294,6 +294,84 @@ static void test_locate(void **state) {
     bench_close(&b);
 }
 
+// how many walls a node lies on, and the axis along which it is nearest to another one of the unit box's; *at: where that wall is
+static int box_walls(const bench *b, int i, int *axis, double *at) {
+    const int dim = silt_nodes_dim(&b->nodes);
+    int n = 0;
+    double nearest = HUGE_VAL;
+    for (int d = 0; d < dim; d++) {
+        const double x = b->nodes.x[dim * i + d], side = x < 0.5 ? 0 : 1, off = fabs(x - side);
+        n += off == 0;
+        if (off > 0 && off < nearest) {
+            nearest = off;
+            *axis = d;
+            *at = side;
+        }
+    }
+    return n;
+}
+
+// A full box: nodes that are put on a wall or into a crease press cells flat onto it, and edges under these get nodes in the same
+// step. It stays full, with walls all around.
+static void test_pressed_cells_leave_no_hole(void **state) {
+    (void)state;
+    static const char *const text[4] = {
+        [2] = HEAD WATER "  seed: %d\n  regions: [{box: [[0, 0], [1, 1]]}]\n"
+                         "walls: [{polyline: [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], condition: slip}]\n",
+        [3] = "silt: 1\ndimension: 3\ntime: {end: 1, output: 1}\ngravity: [0, 0, -9.81]\nfluid:\n  flow: laminar\n  density: 1000\n"
+              "  viscosity: 0\n  size: 0.2\n  jitter: 0.2\n  seed: %d\n  regions: [{box: [[0, 0, 0], [1, 1, 1]]}]\n"
+              "walls: [{box: [[0, 0, 0], [1, 1, 1]], condition: slip}]\n"};
+    for (int trial = 0; trial < 16; trial++) {
+        const int dim = 2 + trial % 2;
+        char filled[2000];
+        bench b;
+        snprintf(filled, sizeof filled, text[dim], trial);
+        bench_open(&b, filled);
+        silt_nodes *nodes = &b.nodes;
+        const double h = b.scene->fluid.size;
+        uint64_t random = (uint64_t)trial;
+        int axis = 0, n_put = 0, n_come = 0;
+        double at = 0;
+        // places on walls and in creases get empty
+        silt_memory_take(&b.memory, &b.mesh, nodes);
+        for (int i = 0; i < nodes->count; i++)
+            b.memory.dead[i] = box_walls(&b, i, &axis, &at) == dim - 1 && silt_uniform(&random) < 0.5;
+        rebuild(&b, false);
+        // the nodes before them come near, then onto the wall
+        for (int step = 0; step < 2; step++) {
+            silt_memory_take(&b.memory, &b.mesh, nodes);
+            for (int i = 0; i < nodes->count; i++) {
+                double *x = nodes->x + dim * i, on[3], room = HUGE_VAL;
+                if (nodes->wall[i][dim - 1] >= 0 || box_walls(&b, i, &axis, &at) != dim - 2 || fabs(x[axis] - at) > 1.3 * h)
+                    continue;
+                for (int k = 0; k < nodes->count; k++) {
+                    double square = 0;
+                    for (int d = 0; d < dim && k != i; d++)
+                        square += silt_square(nodes->x[dim * k + d] - (d == axis ? at : x[d]));
+                    room = k == i ? room : silt_min(room, sqrt(square));
+                }
+                if (room < 0.6 * h)
+                    continue;
+                n_put += step;
+                x[axis] = step ? at : at + 0.25 * (x[axis] - at);
+                if (step)
+                    silt_walls_touching(&b.walls, x, 1e-6 * h, nodes->wall[i], on);
+            }
+            if (step) {
+                const int before = nodes->count;
+                silt_mesh_refine(&b.mesh, nodes, &b.memory, h / 1.3);
+                n_come = nodes->count - before;
+            }
+            rebuild(&b, false);
+        }
+        assert_true(n_put > 2 && n_come > 2);
+        for (int k = 0; k < b.mesh.n_facet; k++)
+            assert_int_equal(b.mesh.facet_kind[k], FACET_WALL);
+        assert_true(fabs(silt_mesh_volume(&b.mesh, nodes->x) - 1) < 1e-12);
+        bench_close(&b);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_delaunay),
@@ -302,6 +380,7 @@ int main(void) {
         cmocka_unit_test(test_flips_book_nothing),
         cmocka_unit_test(test_volume_and_debt_close),
         cmocka_unit_test(test_contact_with_walls),
+        cmocka_unit_test(test_pressed_cells_leave_no_hole),
         cmocka_unit_test(test_locate),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

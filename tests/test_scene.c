@@ -472,7 +472,7 @@ static void test_resolved(void **state) {
     static const char *const file[] = {RIGHT "whole.yaml", RIGHT "dry.yaml",   RIGHT "plain.yaml",
                                        RIGHT "plain.json", RIGHT "water.yaml", RIGHT "space.yaml"};
     for (int i = 0; i < 6; i++) {
-        const char *set[] = {"time.end=0.1", i == 5 ? "gravity=[0.1, 1, 0]" : "gravity=[0.1, -9.80665]",
+        const char *set[] = {"time.end=0.1", i == 5 ? "gravity=[0.1, 0, -9.80665]" : "gravity=[0.1, -9.80665]",
                              "title='a: #b'"};
         silt_scene *a = right(file[i], i % 2 ? 3 : 0, set);
         silt_scene *b = right(make_text("resolved.yaml", a->resolved), 0, NULL);

@@ -267,6 +267,7 @@ static void test_water_and_grain_together(void **unused) {
     free(run.x_old);
     free(run.wall_before);
     free(run.v_before);
+    free(run.debt_before);
     free(run.map);
     silt_scene_free(&scene);
 }

@@ -1155,6 +1155,20 @@ static void test_hole(void **state) {
             assert_near(distance_at(b, 2.1, 0.5, 0.35, NULL), -hypot(0.1, 0.05), 1e-12);
         bench_free(b);
     }
+    // its back to the water
+    bench *turned = bench_new(3);
+    bench_box(turned, 2, 1, 1, WALL_SLIP);
+    double back[12];
+    for (int c = 0; c < 4; c++)
+        memcpy(back + 3 * c, corner + 3 * (3 - c), 3 * sizeof *back);
+    outlet.corner = back;
+    turned->scene.fluid.outlet = &outlet;
+    turned->scene.fluid.n_outlet = 1;
+    silt_error err = {0};
+    assert_int_equal(silt_walls_create(&turned->walls, &turned->scene, &err), SILT_INPUT);
+    assert_non_null(strstr(err.text, "key 'fluid.outlets.0.corners': found corners that turn with their back to the water"));
+    assert_int_equal(turned->walls.count, 0);
+    bench_free(turned);
     // in the plane: what is left on both sides
     bench *b = bench_new(2);
     bench_chain(b, 4, (const double[]){0, 0, 2, 0, 2, 1, 0, 1}, true, WALL_SLIP);

@@ -6,6 +6,8 @@
 #define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
 #define EXPLICIT_SHARE 0.02 // of the water that may be too stiff for explicit viscosity: slivers
 #define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
+#define FLUID_SPRAY 5        // passes after which the worst node may lag behind the rest
+#define FLUID_NODE 0.25     // of h^D: the volume against which the continuity of a smaller node counts
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 #define FLUID_INNER 1e4     // accuracy of a pressure increment over that of the step, at least: refreshes are counted, so what an
@@ -263,20 +265,25 @@ static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid,
     return SILT_OK;
 }
 
-// largest share of its volume that a node would gain or lose in the step. @return that node
+// largest share of its volume that a node would gain or lose in the step; spray counts as a quarter of a cell. @return that node
 static int worst_residual(silt_fluid *f, const silt_step *s) {
     const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
     int worst = 0;
+    double lacking = 0, all = 0;
     f->worst = 0;
     for (int j = 0; j < f->n_node; j++) {
         if (!s->mesh->wet[j] || (!consistent && s->mesh->surface[j]) || f->mobile[j] != 1)
             continue;
-        const double share = fabs(f->residual[j]) * s->dt / f->volume[j];
+        const double h = silt_node_h(s->nodes, j, s->scene->fluid.size);
+        const double share = fabs(f->residual[j]) * s->dt / silt_max(f->volume[j], FLUID_NODE * (f->dim == 3 ? h * h * h : h * h));
         if (share > f->worst || !isfinite(share)) {
             f->worst = share;
             worst = j;
         }
+        lacking += fabs(f->residual[j]) * s->dt;
+        all += f->volume[j];
     }
+    f->lacking = all > 0 ? lacking / all : 0;
     return worst;
 }
 
@@ -533,6 +540,11 @@ static double strictness(const silt_fluid *f, const silt_step *s) {
     return fastest > 0 && !f->last_try ? silt_clamp(s->dt * fastest / (0.5 * h), least, 1) : 1;
 }
 
+// Small cells of spray turn while they are solved, and are not waited for when all that is lacking is little
+static bool spray_lags(const silt_fluid *f, double tolerance) {
+    return f->iterations >= FLUID_SPRAY && f->lacking < 0.1 * tolerance && f->worst < 1e3 * tolerance;
+}
+
 static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, silt_error *err) {
     const silt_fluid_def *def = &s->scene->fluid;
     const bool consistent = def->pressure == PRESSURE_CONSISTENT;
@@ -596,7 +608,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         bool solved;
         SILT_TRY(velocity_star(f, s, stiff > 0, drop, &solved, err));
         int worst_node = star_continuity(f, s, p);
-        if (!solved && f->worst <= strict * def->tolerance) {
+        if (!solved && (f->worst <= strict * def->tolerance || spray_lags(f, strict * def->tolerance))) {
             SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->star));
             SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, 0, f->star, &solved, err));
             SILT_TRY(status);
@@ -608,7 +620,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         const bool passed = def->scheme == SCHEME_IMPLICIT || stiff == 0 || f->iterations > 0;
         const bool fine = passed && f->worst <= (first ? 0.1 : 1) * strict * def->tolerance && (!first || swirl(f, s) <= def->tolerance);
         // at the end of the iterations a small residual is accepted; a first pressure takes longer to meet its projection
-        if (fine || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
+        if (fine || (!first && spray_lags(f, strict * def->tolerance)) || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);
             return astray_node(f, s, err);
         }

@@ -79,6 +79,7 @@ typedef struct silt_fluid {
     // of the last step
     int iterations, momentum_iterations, pressure_iterations;
     double worst;             // largest |residual| dt / volume
+    double lacking;           // sum of |residual| dt over that of the volumes
     double from_grains[3];    // N, force of the grains on the water
     double dissipated;        // J, viscous
     double worked;            // J, of bodies, inlets, walls and grains on the water

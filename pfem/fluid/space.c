@@ -60,6 +60,19 @@ static void weigh_cells(silt_space *q, const silt_fluid *f, const silt_mesh *mes
     }
 }
 
+// What cell e's corners can do for a pressure gradient `own` in it: walls take their share. Without that the compact matrix
+// of thin cells on walls is far stiffer than S, and conjugate gradients crawl
+static void mobility(const silt_fluid *f, const silt_mesh *mesh, int e, const double *own, double out[3]) {
+    out[0] = out[1] = out[2] = 0;
+    for (int c = 0; c < 4; c++) {
+        const int i = mesh->cell[e][c];
+        double free[3] = {own[0], own[1], own[2]};
+        silt_hold_project(f, i, free);
+        for (int d = 0; d < 3; d++)
+            out[d] += 0.25 * f->inverse[e] * f->volume[i] / f->inertia[i] * free[d];
+    }
+}
+
 // one row of G, L and the compact Laplacian, from the cells of the node
 static void row_gather(const silt_space *q, const silt_fluid *f, const silt_mesh *mesh, int i, double (*row)[4],
                        double *compact) {
@@ -70,13 +83,17 @@ static void row_gather(const silt_space *q, const silt_fluid *f, const silt_mesh
         while (cell[a] != i)
             a++;
         const double *own = flux + 3 * a, share = f->share ? f->share[4 * e + a] : 0;
+        double moved[3];
+        const bool held = f->hold[cell[0]] || f->hold[cell[1]] || f->hold[cell[2]] || f->hold[cell[3]];
+        if (held)
+            mobility(f, mesh, e, own, moved);
         for (int c = 0; c < 4; c++) {
             const int at = q->place[cell[c]];
             const double *other = flux + 3 * c, along = own[0] * other[0] + own[1] * other[1] + own[2] * other[2];
             for (int d = 0; d < 3; d++)
                 row[at][d] += 0.25 * own[d] + share * other[d];
             row[at][3] += q->weight[2 * e] * along;
-            compact[at] += q->weight[2 * e + 1] * along;
+            compact[at] += held ? q->weight[2 * e] * along + silt_dot(3, moved, other) : q->weight[2 * e + 1] * along;
         }
     }
 }

@@ -36,7 +36,3 @@ void silt_tension_force(const silt_mesh *mesh, const double *x, double tension, 
         }
     }
 }
-
-double silt_tension_time(double tension, double density, double h) {
-    return tension > 0 ? sqrt(density * h * h * h / (2 * M_PI * tension)) : HUGE_VAL;
-}

@@ -148,7 +148,5 @@ void silt_wall_law_clear(silt_wall_law *law);
 
 /** out += force of the free surface's tension (N/m) on the nodes at positions x */
 void silt_tension_force(const silt_mesh *mesh, const double *x, double tension, double *out);
-/** s, step in which the shortest ripples that cells of size h carry move by about their length (Brackbill et al. 1992) */
-double silt_tension_time(double tension, double density, double h);
 
 #endif

@@ -1,6 +1,6 @@
 // the cloud's density: crowded nodes leave, stretched places get nodes
 #include "delaunay.h"
-#include "pfem.h"
+#include "remesh.h"
 
 /* Lengths are held against h, the mean of the local sizes of both ends. Candidates are taken in the order of how far off they
  * are, never of their numbers. A node leaves with its surroundings locked for the step; a node comes only where it has room,
@@ -88,7 +88,6 @@ typedef struct refinement {
     const silt_walls *walls;
     int dim;
     double h; // fluid.size
-    bool fed; // in space: water comes in or leaves through openings that have nodes
     uint8_t *locked, *long_edge; // one per node: has an edge that may be too long
     int *facet_start, *facet; // boundary facets of every node
     candidate *list;
@@ -335,7 +334,18 @@ static void refine_flat(refinement *r) {
             refine_remove(r, r->list[c].a);
 }
 
-// cells around the edge a-b; *closed: no boundary facet has the edge
+// A node that was put on a wall has pressed cells flat onto it, which the rebuild leaves out: an edge under them lies on the wall
+// now. As one from within it would get a node without walls, and with it a hole in the wall's facets.
+static bool refine_pressed(const refinement *r, const int *cell) {
+    double corner[12];
+    if (!r->walls)
+        return false;
+    silt_cell_corners(r->mesh, r->nodes->x, cell, corner);
+    const silt_cell_shape shape = silt_cell_measure(r->dim, corner);
+    return silt_cell_on_wall(r->mesh, r->nodes, cell, &shape, silt_cell_h(r->nodes, r->dim + 1, cell, r->h));
+}
+
+// cells around the edge a-b that are water still; *closed: no boundary facet has the edge
 static int refine_around(const refinement *r, int a, int b, int room, int *around, bool *closed) {
     int n = 0, n_other = 0, other[64];
     *closed = true;
@@ -344,7 +354,7 @@ static int refine_around(const refinement *r, int a, int b, int room, int *aroun
         bool has = false;
         for (int c = 0; c <= r->dim; c++)
             has |= cell[c] == b;
-        if (!has)
+        if (!has || refine_pressed(r, cell))
             continue;
         around[n++] = r->mesh->node_cell[k];
         for (int c = 0; c <= r->dim; c++) {
@@ -385,8 +395,10 @@ static int refine_walls(const refinement *r, int a, int b, int wall[3]) {
             if (same && n < 3 && (n == 0 || wall[n - 1] != w))
                 wall[n++] = w;
         }
-    for (int s = 0; s < 3 && n == 0; s++)
-        for (int end = 0; end < 2 && n == 0; end++) {
+    // an inlet's node or a corner has none of its own: all that it stands on, both of a crease
+    const bool fixed = n == 0;
+    for (int s = 0; s < 3 && fixed; s++)
+        for (int end = 0; end < 2 && n < 3; end++) {
             const int w = nodes->wall[end ? b : a][s];
             if (w >= 0 && refine_stands_on(r, end ? a : b, w))
                 wall[n++] = w;
@@ -519,9 +531,9 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
     for (int s = 0; s < n_wall; s++)
         nodes->wall[i][s] = wall[s];
     silt_memory_extend(r->memory, nodes->count);
-    // on a wall in space the edge's ends say it: nothing is free around it. Where openings stretch the cells on walls these would
-    // go otherwise, and leave dents
-    r->memory->interior[i] = closed || (r->fed && (n_wall || open) && r->memory->interior[a] && r->memory->interior[b]);
+    // on a wall in space the edge's ends say it: nothing is free around it. Stretched cells on walls would go otherwise, and leave
+    // dents
+    r->memory->interior[i] = closed || (dim == 3 && (n_wall || open) && r->memory->interior[a] && r->memory->interior[b]);
     for (int k = 0; k < n_around; k++)
         for (int c = 0; c <= dim; c++) {
             const int j = r->mesh->cell[around[k]][c];
@@ -647,10 +659,8 @@ void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *mem
     refinement r = {.mesh = mesh, .nodes = nodes, .memory = memory, .walls = mesh->walls, .dim = silt_nodes_dim(nodes), .h = h};
     r.locked = silt_alloc((size_t)mesh->n_node + 1, 1);
     r.long_edge = silt_alloc((size_t)mesh->n_node + 1, 1);
-    for (int i = 0; i < mesh->n_node; i++) {
+    for (int i = 0; i < mesh->n_node; i++)
         r.locked[i] = memory->dead[i];
-        r.fed |= r.dim == 3 && (nodes->kind[i] == NODE_INLET || nodes->kind[i] == NODE_OPEN);
-    }
     refine_facets(&r);
     refine_crowded(&r);
     refine_flat(&r);

@@ -86,9 +86,7 @@ void silt_cell_set_clear(silt_cell_set *set) {
 
 // ---- what a cell of the cloud is
 
-// nodes all on one patch of the walls make no cell where they lie flat on it
-static bool cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const silt_cell_shape *shape,
-                         double h) {
+bool silt_cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const silt_cell_shape *shape, double h) {
     if (shape->height >= CELL_FLAT * h)
         return false;
     if (silt_mesh_share(mesh, nodes, mesh->dim + 1, cell))
@@ -521,7 +519,7 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
         const silt_cell_shape shape = silt_cell_measure(dim, corner);
         const double h = silt_cell_h(nodes, dim + 1, cell, scene->fluid.size);
         const bool flat = dim == 3 && shape.height < CELL_FLAT * h;
-        if ((dim == 2 && shape.volume < 1e-6 * h * h) || cell_on_wall(mesh, nodes, cell, &shape, h))
+        if ((dim == 2 && shape.volume < 1e-6 * h * h) || silt_cell_on_wall(mesh, nodes, cell, &shape, h))
             continue;
         cell_centre(mesh, scene, corner, centre);
         if (cell_behind(mesh, nodes, barrier, cell, centre))
@@ -603,7 +601,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
         const silt_cell_shape shape = silt_cell_measure(dim, corner);
         const double h = silt_cell_h(nodes, dim + 1, cell, scene->fluid.size);
         const bool flat = dim == 3 && shape.height < CELL_FLAT * h;
-        if ((dim == 2 && shape.volume < 1e-9 * h * h) || cell_on_wall(mesh, nodes, cell, &shape, h))
+        if ((dim == 2 && shape.volume < 1e-9 * h * h) || silt_cell_on_wall(mesh, nodes, cell, &shape, h))
             continue;
         const double bound = scene->fluid.alpha * h;
         const bool round = shape.radius < bound;

@@ -54,6 +54,8 @@ typedef struct silt_cell_shape {
 silt_cell_shape silt_cell_measure(int dim, const double *corner);
 /** wanted size at a cell: the mean of its nodes', m */
 double silt_cell_h(const silt_nodes *nodes, int n_corner, const int *cell, double size);
+/** true for nodes all on one patch of the walls: they make no cell of water where they lie flat on it */
+bool silt_cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int *cell, const silt_cell_shape *shape, double h);
 silt_facet_kind silt_facet_kind_of(const silt_mesh *mesh, const silt_nodes *nodes, const int facet[3]);
 /** silt_mesh_connect of a mesh whose `across` is right already */
 void silt_mesh_connect_known(silt_mesh *mesh, const silt_nodes *nodes);

@@ -431,7 +431,7 @@ static void seed_velocity(seed *s, int first) {
     silt_nodes *nodes = s->nodes;
     const double g = silt_length(3, scene->gravity);
     for (int i = first; i < nodes->count; i++) {
-        if (nodes->kind[i] != NODE_FLUID || scene->fluid.velocity.kind == FORMULA_NONE)
+        if ((nodes->kind[i] != NODE_FLUID && nodes->kind[i] != NODE_OPEN) || scene->fluid.velocity.kind == FORMULA_NONE)
             continue;
         double v[3] = {0}, x[3] = {0};
         memcpy(x, nodes->x + s->dim * i, (size_t)s->dim * sizeof *x);

@@ -61,86 +61,6 @@ static void run_view(silt_run *run, silt_view *view) {
 
 // ---------------------------------------------------------------- steps in time
 
-// time in which a wall that moves passes a cell of the water on it: a gate also that slides along the water
-static double walls_time(const silt_run *run) {
-    const silt_nodes *nodes = &run->nodes;
-    const silt_walls *walls = &run->walls;
-    const int D = silt_nodes_dim(nodes);
-    double least = HUGE_VAL;
-    for (int i = 0; i < nodes->count; i++)
-        for (int k = 0; k < 3 && nodes->wall[i][k] >= 0; k++) {
-            const silt_wall_motion *m = &walls->motion[walls->wall[nodes->wall[i][k]]];
-            const int up = D == 3 ? 2 : 1;
-            double v[3] = {m->velocity[0], m->velocity[1], m->velocity[2]};
-            v[0] -= m->spin * (nodes->x[D * i + up] - m->centre[up]);
-            v[up] += m->spin * (nodes->x[D * i] - m->centre[0]);
-            const double speed = silt_length(3, v);
-            if (speed > 0)
-                least = silt_min(least, silt_node_h(nodes, i, run->scene->fluid.size) / speed);
-        }
-    return least;
-}
-
-// largest step that accuracy allows: courant number, cells that do not turn over, gravity, growth
-static double step_wanted(const silt_run *run) {
-    const silt_scene *scene = run->scene;
-    const silt_nodes *nodes = &run->nodes;
-    const int D = silt_nodes_dim(nodes);
-    double dt = scene->time.step > 0 ? scene->time.step : HUGE_VAL;
-    dt = silt_min(dt, scene->time.output);
-    if (!scene->fluid.on)
-        return dt;
-    // time in which a node crosses a cell, or falls as far
-    double least = HUGE_VAL;
-    for (int i = 0; i < nodes->count; i++) {
-        if (nodes->kind[i] == NODE_CORNER || nodes->kind[i] == NODE_BED)
-            continue;
-        const double h = silt_node_h(nodes, i, scene->fluid.size), speed = silt_length(D, nodes->v + D * i);
-        double a[3];
-        silt_run_acceleration(run, nodes->x + D * i, a);
-        const double g = silt_length(D, a);
-        if (speed > 0)
-            least = silt_min(least, h / speed);
-        if (g > 0)
-            least = silt_min(least, sqrt(h / g));
-        least = silt_min(least, silt_tension_time(scene->fluid.surface_tension, scene->fluid.density, h));
-    }
-    least = silt_min(least, walls_time(run));
-    // water at rest meets a belt or a lid
-    for (int k = 0; k < scene->n_wall; k++) {
-        const double speed = silt_length(3, scene->wall[k].velocity);
-        if (speed > 0)
-            least = silt_min(least, scene->fluid.size / speed);
-    }
-    dt = silt_min(dt, scene->time.cfl * least);
-    // it grows by half at most, and with grains by one of their steps at least
-    if (run->dt > 0) {
-        const double small = run->coupling ? silt_coupling_dem.step(run->coupling) : 0;
-        dt = silt_min(dt, run->dt + silt_max(small, 0.5 * run->dt));
-    }
-
-    // a cell may lose four fifths of its volume; slivers do not decide
-    const double shortest = 0.25 * dt;
-    for (int e = 0; e < run->mesh.n_cell && dt > shortest; e++) {
-        const int *cell = run->mesh.cell[e];
-        double h = 0, volume = silt_cell_volume(&run->mesh, nodes->x, e), start[12], x[12];
-        for (int a = 0; a <= D; a++)
-            h += silt_node_h(nodes, cell[a], scene->fluid.size) / (D + 1);
-        if (volume < (D == 3 ? 0.03 * h * h * h : 0.1 * h * h))
-            continue;
-        silt_cell_corners(&run->mesh, nodes->x, cell, start);
-        while (dt > shortest) {
-            for (int a = 0; a <= D; a++)
-                for (int d = 0; d < D; d++)
-                    x[D * a + d] = start[D * a + d] + dt * nodes->v[D * cell[a] + d];
-            if (silt_simplex_volume(D, x) > 0.2 * volume)
-                break;
-            dt *= 0.8;
-        }
-    }
-    return dt;
-}
-
 // next step: ends of frames are met exactly, and with grains it is a whole number of their steps
 static int64_t step_choose(silt_run *run, double wanted) {
     const double output = run->scene->time.output;
@@ -306,7 +226,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     silt_clock_reset();
     const double before = run->dt;
     run->dt_old = run->step > 0 ? before : 0;
-    const double wanted = step_wanted(run);
+    const double wanted = silt_run_pace(run);
     if (step_sane(run, wanted, err) != SILT_OK) {
         run->whole = false; // not worth a checkpoint
         return SILT_FAILED;

@@ -132,6 +132,11 @@ void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def);
 silt_status silt_run_move(silt_run *run, silt_error *err);
 /** gravity and body force at a place (dim numbers), m/s2 */
 void silt_run_acceleration(const silt_run *run, const double *x, double a[3]);
+
+// pace.c ----------------------------------------------------------------------------------------------
+/** Longest step [s] that accuracy allows: courant number, cells that do not turn over, gravity, walls that move, growth. */
+double silt_run_pace(const silt_run *run);
+
 // level.c ---------------------------------------------------------------------------------------------
 /** After the water has moved: nodes on openings with a level back onto them, those that came through with them; what passed goes
  * to the ledger, in or out. */

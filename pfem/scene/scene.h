@@ -357,6 +357,11 @@ silt_status silt_series_rising(const silt_series *series, silt_error *err);
 /** what a scene needs */
 static inline bool silt_scene_has_dem(const silt_scene *s) { return s->grains.on || s->n_body > 0; }
 
+/** s, step in which the shortest ripples that cells of size h carry move by about their length (Brackbill et al. 1992) */
+static inline double silt_tension_time(double tension, double density, double h) {
+    return tension > 0 ? sqrt(density * h * h * h / (2 * M_PI * tension)) : HUGE_VAL;
+}
+
 /** which coordinate points up: y in 2-D, z in 3-D */
 static inline int silt_scene_up(const silt_scene *s) { return s->dimension == 3 ? 2 : 1; }
 

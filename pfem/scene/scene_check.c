@@ -59,7 +59,23 @@ static void check_time(silt_reader *reader, const silt_scene *scene) {
                       scene->time.output, scene->time.end / scene->time.output);
 }
 
-// walls, openings --------------------------------------------------------------------------------------
+#define CHECK_STEPS 1e7 // more of them are no run
+
+// steps that the tension of the surface bounds: with too much of it they become too many
+static void check_tension(silt_reader *reader, const silt_scene *scene) {
+    const silt_fluid_def *fluid = &scene->fluid;
+    double h = fluid->size;
+    for (int i = 0; i < fluid->n_size; i++)
+        h = silt_min(h, fluid->size_at[i].size);
+    const double step = scene->time.cfl * silt_tension_time(fluid->surface_tension, fluid->density, h), n = scene->time.end / step;
+    if (step > 0 && n > CHECK_STEPS && !(scene->time.steps > 0 && scene->time.steps <= CHECK_STEPS))
+        silt_complain(reader, silt_tree_find(reader->root, "fluid.surface_tension"),
+                      "key 'fluid.surface_tension': found %.10g, which bounds a step to %.3g s and makes %.3g steps, allowed at most %g "
+                      "steps",
+                      fluid->surface_tension, step, n, CHECK_STEPS);
+}
+
+// walls ------------------------------------------------------------------------------------------------
 static void check_walls(silt_reader *reader, silt_scene *scene) {
     for (int i = 0; i < scene->n_wall; i++) {
         silt_wall *wall = &scene->wall[i];
@@ -80,71 +96,6 @@ static void check_walls(silt_reader *reader, silt_scene *scene) {
                           "polyline that crosses or touches itself nowhere",
                           i, crossing[1], crossing[0]);
     }
-}
-
-static void check_opening(silt_reader *reader, const char *list, int i, const double *from, const double *to) {
-    const silt_tree *node = silt_tree_find(reader->root, "fluid.%s.%d", list, i);
-    const silt_tree *from_node = silt_tree_item(node, "from"), *to_node = silt_tree_item(node, "to");
-    if (from_node && to_node && from[0] == to[0] && from[1] == to[1])
-        silt_complain(reader, to_node,
-                      "key 'fluid.%s.%d.to': found the point [%.10g, %.10g] of `from` again, allowed another "
-                      "one",
-                      list, i, to[0], to[1]);
-}
-
-// the corners of a polygon in space: in one plane, all turning the same way, none twice
-static void check_corners(silt_reader *reader, const silt_scene *scene, int k) {
-    const silt_opening o = silt_opening_of(scene, k);
-    const int i = o.inlet ? k : k - scene->fluid.n_inlet;
-    const char *list = o.inlet ? "inlets" : "outlets";
-    const silt_tree *node = silt_tree_find(reader->root, "fluid.%s.%d.corners", list, i);
-    if (!node || o.n_corner < 3)
-        return;
-    bool flat = true, convex = silt_length(3, o.normal) > 0;
-    for (int c = 0; c < o.n_corner; c++) {
-        const double *p = o.corner + 3 * c, *q = o.corner + 3 * ((c + 1) % o.n_corner);
-        flat &= fabs(silt_opening_height(&o, p)) <= 1e-6 * o.size;
-        convex &= silt_opening_depth(&o, p) >= -1e-9 * o.size && hypot(hypot(q[0] - p[0], q[1] - p[1]), q[2] - p[2]) > 0;
-    }
-    if (!flat || !convex)
-        silt_complain(reader, node, "key 'fluid.%s.%d.corners': found %s, allowed a flat, convex polygon, each corner once", list, i,
-                      flat ? "a polygon that is not convex or has no area" : "corners that do not lie in one plane");
-}
-
-// the Laplacian's increments are free on an opening: nothing there holds the pressure that the level gives
-static void check_level_pressure(silt_reader *reader, const silt_scene *scene) {
-    bool level = false;
-    for (int k = 0; k < silt_opening_count(scene); k++)
-        level |= silt_opening_of(scene, k).level != NULL;
-    if (level && scene->fluid.pressure == PRESSURE_LAPLACIAN)
-        silt_complain(reader, silt_tree_find(reader->root, "fluid.pressure"),
-                      "key 'fluid.pressure': found laplacian beside an opening with a head or level, allowed consistent there");
-}
-
-// openings have two ends, or corners, and a name of their own
-static void check_openings(silt_reader *reader, const silt_scene *scene) {
-    const silt_fluid_def *fluid = &scene->fluid;
-    int n_in = fluid->n_inlet, n = n_in + fluid->n_outlet;
-    check_level_pressure(reader, scene);
-    for (int i = 0; i < n && scene->dimension == 3; i++)
-        check_corners(reader, scene, i);
-    for (int i = 0; i < n_in; i++)
-        check_opening(reader, "inlets", i, fluid->inlet[i].from, fluid->inlet[i].to);
-    for (int i = 0; i < fluid->n_outlet; i++)
-        check_opening(reader, "outlets", i, fluid->outlet[i].from, fluid->outlet[i].to);
-    // few: all pairs
-    for (int i = 1; i < n && i < 1000; i++)
-        for (int k = 0; k < i; k++) {
-            const char *a = i < n_in ? fluid->inlet[i].name : fluid->outlet[i - n_in].name;
-            const char *b = k < n_in ? fluid->inlet[k].name : fluid->outlet[k - n_in].name;
-            if (!a || !b || strcmp(a, b) != 0)
-                continue;
-            const char *list = i < n_in ? "inlets" : "outlets";
-            int at = i < n_in ? i : i - n_in;
-            silt_complain(reader, silt_tree_find(reader->root, "fluid.%s.%d.name", list, at),
-                          "key 'fluid.%s.%d.name': found the name '%s' again, allowed a name of its own", list, at, a);
-            break;
-        }
 }
 
 // inside the walls -------------------------------------------------------------------------------------
@@ -183,7 +134,7 @@ static check_box check_box_make(const silt_scene *scene, bool water) {
         const silt_wall *wall = &scene->wall[i];
         // where a surface lies is not known here
         if (wall->surface)
-            return box;
+            return (check_box){.dim = box.dim};
         for (int k = 0; k < wall->n_point; k++)
             check_box_add(&box, wall->point + 3 * k, wall->point + 3 * k);
         if (wall->form == WALL_BOX && wall->lo[0] < wall->hi[0])
@@ -745,8 +696,10 @@ static void check_gauges(silt_reader *reader, const silt_scene *scene) {
 void silt_scene_check(silt_reader *reader, silt_scene *scene) {
     check_blocks(reader, scene);
     check_time(reader, scene);
+    check_tension(reader, scene);
     check_walls(reader, scene);
-    check_openings(reader, scene);
+    const check_box box = check_box_make(scene, true);
+    silt_scene_check_openings(reader, scene, box.lo, box.hi);
     check_inside(reader, scene);
     check_period(reader, scene);
     check_bodies(reader, scene);

@@ -167,6 +167,8 @@ bool silt_polygon_sound(silt_reader *reader, const silt_tree *whole, const silt_
 /** Reads the tables that the scene names and checks what they hold; settles the defaults that hang on other keys. */
 void silt_scene_settle(silt_reader *reader, silt_scene *scene);
 void silt_scene_check(silt_reader *reader, silt_scene *scene);
+/** Inlets and outlets (scene_openings.c). @param lo, hi  of the box that walls and water span, hi < lo: not known */
+void silt_scene_check_openings(silt_reader *reader, const silt_scene *scene, const double lo[3], const double hi[3]);
 /** the resolved scene as YAML; owned by the caller. names: files with their folder (true), or their last part only */
 char *silt_scene_text(const silt_scene *scene, bool folders);
 uint64_t silt_scene_hash(const silt_scene *scene); // scene_hash.c

@@ -108,6 +108,18 @@ static void box_make(silt_walls *walls, int e, const silt_wall *wall) {
         }
 }
 
+// in walls from files; the scene's own ones were looked at when it was read
+static silt_status openings_face(silt_walls *walls, const silt_scene *scene, silt_error *err) {
+    const int k = wall_turned(walls, scene), n_in = scene->fluid.n_inlet;
+    if (k < 0)
+        return SILT_OK;
+    silt_walls_clear(walls);
+    return silt_fail(err, SILT_INPUT,
+                     "%s: key 'fluid.%s.%d.corners': found corners that turn with their back to the water of the wall they lie in, allowed "
+                     "counter-clockwise as the water in front of the opening sees them",
+                     scene->path ? scene->path : "scene", k < n_in ? "inlets" : "outlets", k < n_in ? k : k - n_in);
+}
+
 // the walls once more, with holes where openings are
 static void elements_cut(silt_walls *walls, const silt_scene *scene) {
     if (!silt_opening_count(scene))
@@ -390,6 +402,9 @@ silt_status silt_walls_create(silt_walls *walls, const silt_scene *scene, silt_e
             triangles_make(walls, scene, surface);
         else
             segments_make(walls, scene);
+        status = openings_face(walls, scene, err);
+    }
+    if (status == SILT_OK) {
         elements_cut(walls, scene);
         vertices_weld(walls);
         elements_join(walls);

@@ -94,6 +94,8 @@ typedef struct wall_piece {
     double corner[3][3];
     int source; // element that it is of
 } wall_piece;
+/** the opening whose back is turned to the water of an element that it lies in (3-D), or -1 */
+int wall_turned(const silt_walls *walls, const silt_scene *scene);
 /** What is left of the elements, before they are joined, where openings through which the water's own motion carries it lie in
  * them: outlets, and inlets with a head. @return how many pieces; *piece is owned by the caller */
 int wall_cut(const silt_walls *walls, const silt_scene *scene, wall_piece **piece);

@@ -137,6 +137,25 @@ static void split_edges(piece_list *list, const uint8_t *cut, double gap) {
     free(corner.piece);
 }
 
+int wall_turned(const silt_walls *walls, const silt_scene *scene) {
+    for (int k = 0; k < silt_opening_count(scene); k++) {
+        const silt_opening o = silt_opening_of(scene, k);
+        double middle[3] = {0}, in[3];
+        for (int c = 0; c < o.n_corner; c++)
+            for (int d = 0; d < 3; d++)
+                middle[d] += o.corner[3 * c + d] / o.n_corner;
+        for (int e = 0; e < walls->count && walls->dim == 3; e++) {
+            if (wall_dot(walls->normal[e], o.normal) > 1e-9 - 1 || walls->index->step[walls->wall[e]].moves ||
+                fabs(silt_opening_height(&o, walls->corner[e][0])) > 1e-6 * o.size)
+                continue;
+            wall_inside(walls, e, middle, in);
+            if (in[0] >= 0 && in[1] >= 0 && in[2] >= 0)
+                return k;
+        }
+    }
+    return -1;
+}
+
 int wall_cut(const silt_walls *walls, const silt_scene *scene, wall_piece **piece) {
     piece_list list = {0};
     const int dim = wall_dim(walls);
