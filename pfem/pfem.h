@@ -135,6 +135,8 @@ void silt_nodes_clear(silt_nodes *nodes);
 int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double *x);
 /** Removes nodes with dead[i] != 0, keeps the order; map[i] is the new index or -1 */
 void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map);
+/** Puts the nodes in another order: order[k] becomes the k-th */
+void silt_nodes_arrange(silt_nodes *nodes, const int *order);
 /** Fills the scene's regions with water nodes, inlets and tank corners; leaves out what lies in `solid` (bed, bodies). With
  * fluid.sizes the spacing is the local one and nodes->h is written. */
 typedef bool (*silt_solid_test)(const void *context, const double *x, double margin);

@@ -25,257 +25,264 @@ KERNEL cell_nodal(const int D, const double *x, const int *cell, double v[4][3])
             v[a][d] = x[D * cell[a] + d];
 }
 
-KERNEL pressure(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, const double *shares, double *lost) {
+KERNEL pressure(const int D, const silt_fluid *f, const silt_mesh *mesh, int e, const silt_to to, const double *p, const double *shares) {
+    const int *cell = mesh->cell[e];
+    const double *share = shares ? shares + (D + 1) * e : NULL;
+    double g[4][3], slope[3] = {0}, mean = 0;
+    cell_flux(D, f, e, g);
+    for (int a = 0; a <= D; a++)
+        mean += p[cell[a]];
+    mean *= 1.0 / (D + 1);
+    for (int a = 0; a <= D && shares; a++)
+        for (int d = 0; d < D; d++)
+            slope[d] += p[cell[a]] * g[a][d];
+    for (int a = 0; a <= D; a++)
+        for (int d = 0; d < D; d++)
+            to.wide[D * to.at[a] + d] += shares ? g[a][d] * mean + share[a] * slope[d] : g[a][d] * mean;
+}
+
+void silt_assemble_pressure(const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out) {
+    if (f->share)
+        BY_CELL(SUMS(f->dim, out, NULL), pressure, p, f->share);
+    else
+        BY_CELL(SUMS(f->dim, out, NULL), pressure, p, NULL);
+}
+
+KERNEL pressure_lost(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *p, double *lost) {
     for (int e = 0; e < f->n_cell; e++) {
-        const int *cell = mesh->cell[e];
-        const double *share = shares ? shares + (D + 1) * e : NULL;
-        double g[4][3], slope[3] = {0}, mean = 0, sum = 0;
+        double g[4][3], slope[3] = {0}, sum = 0;
         cell_flux(D, f, e, g);
-        for (int a = 0; a <= D; a++)
-            mean += p[cell[a]];
-        mean *= 1.0 / (D + 1);
-        for (int a = 0; a <= D && shares; a++) {
-            sum += share[a];
+        for (int a = 0; a <= D; a++) {
+            sum += f->share[(D + 1) * e + a];
             for (int d = 0; d < D; d++)
-                slope[d] += p[cell[a]] * g[a][d];
+                slope[d] += p[mesh->cell[e][a]] * g[a][d];
         }
-        for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++)
-                out[D * cell[a] + d] += shares ? g[a][d] * mean + share[a] * slope[d] : g[a][d] * mean;
-        for (int d = 0; d < D && shares && lost; d++)
+        for (int d = 0; d < D; d++)
             lost[d] += slope[d] * sum;
     }
 }
 
-void silt_assemble_pressure(const silt_fluid *f, const silt_mesh *mesh, const double *p, double *out, double *lost) {
-    if (f->share)
-        BY_DIM(pressure, f, mesh, p, out, f->share, lost);
-    else
-        BY_DIM(pressure, f, mesh, p, out, NULL, NULL);
+void silt_assemble_pressure_lost(const silt_fluid *f, const silt_mesh *mesh, const double *p, double lost[3]) {
+    BY_DIM(pressure_lost, f, mesh, p, lost);
 }
 
-KERNEL potential(const int D, const silt_fluid *f, const silt_mesh *mesh, double *out) {
-    for (int e = 0; e < f->n_cell; e++) {
-        const int *cell = mesh->cell[e];
-        const double *flux = f->flux + (D + 1) * D * e;
-        for (int d = 0; d < D; d++) {
-            double slope = 0;
-            for (int a = 0; a <= D; a++)
-                slope += f->potential[cell[a]] * flux[D * a + d];
-            for (int a = 0; a <= D; a++)
-                out[D * cell[a] + d] -= slope / (D + 1);
-        }
+KERNEL potential(const int D, const silt_fluid *f, const silt_mesh *mesh, int e, const silt_to to) {
+    const int *cell = mesh->cell[e];
+    const double *flux = f->flux + (D + 1) * D * e;
+    for (int d = 0; d < D; d++) {
+        double slope = 0;
+        for (int a = 0; a <= D; a++)
+            slope += f->potential[cell[a]] * flux[D * a + d];
+        for (int a = 0; a <= D; a++)
+            to.wide[D * to.at[a] + d] -= slope / (D + 1);
     }
 }
 
-void silt_assemble_potential(const silt_fluid *f, const silt_mesh *mesh, double *out) { BY_DIM(potential, f, mesh, out); }
+void silt_assemble_potential(const silt_fluid *f, const silt_mesh *mesh, double *out) {
+    BY_CELL(SUMS(f->dim, out, NULL), potential);
+}
 
-// diagonal: NULL, or the operator's is added to it
-KERNEL viscous(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, double factor, double *out, double *diagonal) {
-    for (int e = 0; e < f->n_cell; e++) {
-        const int *cell = mesh->cell[e];
-        double g[4][3], u[4][3], l[3][3], stress[3][3], trace = 0;
-        cell_flux(D, f, e, g);
-        cell_nodal(D, v, cell, u);
-        for (int d = 0; d < D; d++)
-            for (int k = 0; k < D; k++) {
-                l[d][k] = (u[1][d] - u[0][d]) * g[1][k];
-                for (int a = 2; a <= D; a++)
-                    l[d][k] += (u[a][d] - u[0][d]) * g[a][k];
-            }
-        for (int d = 0; d < D; d++)
-            trace += l[d][d];
-        const double scale = f->mu[e] * f->inverse[e], force = factor * scale;
-        for (int d = 0; d < D; d++)
-            for (int k = 0; k <= d; k++)
-                stress[d][k] = stress[k][d] = force * (l[d][k] + l[k][d] - (d == k ? 2.0 / 3 * trace : 0));
-        for (int d = 0; d < D; d++) {
-            double rest = 0;
-            for (int a = 1; a <= D; a++) {
-                double sum = stress[d][0] * g[a][0];
-                for (int k = 1; k < D; k++)
-                    sum += stress[d][k] * g[a][k];
-                out[D * cell[a] + d] += sum;
-                rest += sum;
-            }
-            out[D * cell[0] + d] -= rest;
+// diagonal: the operator's is added too
+KERNEL viscous(const int D, const silt_fluid *f, const silt_mesh *mesh, int e, const silt_to to, const double *v, double factor,
+               bool diagonal) {
+    const int *cell = mesh->cell[e];
+    double g[4][3], u[4][3], l[3][3], stress[3][3], trace = 0;
+    cell_flux(D, f, e, g);
+    cell_nodal(D, v, cell, u);
+    for (int d = 0; d < D; d++)
+        for (int k = 0; k < D; k++) {
+            l[d][k] = (u[1][d] - u[0][d]) * g[1][k];
+            for (int a = 2; a <= D; a++)
+                l[d][k] += (u[a][d] - u[0][d]) * g[a][k];
         }
-        for (int a = 0; a <= D && diagonal; a++) {
-            double square = 0;
-            for (int d = 0; d < D; d++)
-                square += silt_square(g[a][d]);
-            diagonal[cell[a]] += (1 + 4.0 / (3 * D)) * scale * square;
+    for (int d = 0; d < D; d++)
+        trace += l[d][d];
+    const double scale = f->mu[e] * f->inverse[e], force = factor * scale;
+    for (int d = 0; d < D; d++)
+        for (int k = 0; k <= d; k++)
+            stress[d][k] = stress[k][d] = force * (l[d][k] + l[k][d] - (d == k ? 2.0 / 3 * trace : 0));
+    for (int d = 0; d < D; d++) {
+        double rest = 0;
+        for (int a = 1; a <= D; a++) {
+            double sum = stress[d][0] * g[a][0];
+            for (int k = 1; k < D; k++)
+                sum += stress[d][k] * g[a][k];
+            to.wide[D * to.at[a] + d] += sum;
+            rest += sum;
         }
+        to.wide[D * to.at[0] + d] -= rest;
+    }
+    for (int a = 0; a <= D && diagonal; a++) {
+        double square = 0;
+        for (int d = 0; d < D; d++)
+            square += silt_square(g[a][d]);
+        to.one[to.at[a]] += (1 + 4.0 / (3 * D)) * scale * square;
     }
 }
 
 void silt_assemble_viscous(const silt_fluid *f, const silt_mesh *mesh, const double *v, double factor, double *out) {
-    BY_DIM(viscous, f, mesh, v, factor, out, NULL);
+    BY_CELL(SUMS(f->dim, out, NULL), viscous, v, factor, false);
 }
 
 void silt_assemble_viscous_both(const silt_fluid *f, const silt_mesh *mesh, const double *v, double *out, double *diagonal) {
-    BY_DIM(viscous, f, mesh, v, 1, out, diagonal);
+    BY_CELL(SUMS(f->dim, out, diagonal), viscous, v, 1, true);
 }
 
-KERNEL viscous_diagonal(const int D, const silt_fluid *f, const silt_mesh *mesh, double *diagonal) {
-    for (int e = 0; e < f->n_cell; e++)
-        for (int a = 0; a <= D; a++) {
-            double square = 0;
-            for (int d = 0; d < D; d++)
-                square += silt_square(f->flux[(D + 1) * D * e + D * a + d]);
-            diagonal[mesh->cell[e][a]] += (1 + 4.0 / (3 * D)) * f->mu[e] * f->inverse[e] * square;
-        }
+KERNEL viscous_diagonal(const int D, const silt_fluid *f, const silt_mesh *mesh, int e, const silt_to to) {
+    (void)mesh;
+    for (int a = 0; a <= D; a++) {
+        double square = 0;
+        for (int d = 0; d < D; d++)
+            square += silt_square(f->flux[(D + 1) * D * e + D * a + d]);
+        to.one[to.at[a]] += (1 + 4.0 / (3 * D)) * f->mu[e] * f->inverse[e] * square;
+    }
 }
 
 void silt_assemble_viscous_diagonal(const silt_fluid *f, const silt_mesh *mesh, double *diagonal) {
-    BY_DIM(viscous_diagonal, f, mesh, diagonal);
+    BY_CELL(SUMS(f->dim, NULL, diagonal), viscous_diagonal);
 }
 
-KERNEL mass_excess(const int D, const silt_fluid *f, const silt_mesh *mesh, double density, const double *a, double *out) {
-    for (int e = 0; e < f->n_cell; e++) {
-        const int *cell = mesh->cell[e];
-        double m = density * f->cell_volume[e] / ((D + 1) * (D + 2));
-        if (f->share)
-            for (int b = 0; b <= D; b++)
-                m -= density * f->cell_volume[e] * f->share[(D + 1) * e + b] / ((D + 1) * (D + 2));
-        for (int d = 0; d < D; d++) {
-            double sum = 0;
-            for (int b = 0; b <= D; b++)
-                sum += a[D * cell[b] + d];
-            for (int b = 0; b <= D; b++)
-                out[D * cell[b] + d] += m * ((D + 1) * a[D * cell[b] + d] - sum);
-        }
+KERNEL mass_excess(const int D, const silt_fluid *f, const silt_mesh *mesh, int e, const silt_to to, double density,
+                   const double *a) {
+    const int *cell = mesh->cell[e];
+    double m = density * f->cell_volume[e] / ((D + 1) * (D + 2));
+    if (f->share)
+        for (int b = 0; b <= D; b++)
+            m -= density * f->cell_volume[e] * f->share[(D + 1) * e + b] / ((D + 1) * (D + 2));
+    for (int d = 0; d < D; d++) {
+        double sum = 0;
+        for (int b = 0; b <= D; b++)
+            sum += a[D * cell[b] + d];
+        for (int b = 0; b <= D; b++)
+            to.wide[D * to.at[b] + d] += m * ((D + 1) * a[D * cell[b] + d] - sum);
     }
 }
 
 void silt_assemble_mass_excess(const silt_fluid *f, const silt_mesh *mesh, double density, const double *a, double *out) {
-    BY_DIM(mass_excess, f, mesh, density, a, out);
+    BY_CELL(SUMS(f->dim, out, NULL), mass_excess, density, a);
 }
 
-KERNEL continuity(const int D, silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, const double *potential,
+KERNEL continuity(const int D, const silt_fluid *f, const silt_mesh *mesh, int e, const silt_to to, const double *v, const double *p, const double *potential,
                   const double *shares) {
-    for (int e = 0; e < f->n_cell; e++) {
-        const int *cell = mesh->cell[e];
-        const double *share = shares ? shares + (D + 1) * e : NULL;
-        double g[4][3], u[4][3], pi[4][3], head[4], divergence = 0, carried[3] = {0}, stable[3];
-        cell_flux(D, f, e, g);
-        cell_nodal(D, v, cell, u);
-        cell_nodal(D, f->projection, cell, pi);
+    const int *cell = mesh->cell[e];
+    const double *share = shares ? shares + (D + 1) * e : NULL;
+    double g[4][3], u[4][3], pi[4][3], head[4], divergence = 0, carried[3] = {0}, stable[3];
+    cell_flux(D, f, e, g);
+    cell_nodal(D, v, cell, u);
+    cell_nodal(D, f->projection, cell, pi);
+    for (int a = 0; a <= D; a++)
+        head[a] = p[cell[a]] + (potential ? potential[cell[a]] : 0);
+    cell_slope(D, g, head, stable);
+    for (int a = 1; a <= D; a++)
+        for (int d = 0; d < D; d++)
+            divergence += (u[a][d] - u[0][d]) * g[a][d];
+    for (int a = 0; a <= D && shares; a++)
+        for (int d = 0; d < D; d++)
+            carried[d] += share[a] * u[a][d];
+    const double weight = f->tau[e] * f->inverse[e], part = f->cell_volume[e] * (1.0 / (D + 1));
+    for (int d = 0; d < D; d++) {
+        double sum = 0;
         for (int a = 0; a <= D; a++)
-            head[a] = p[cell[a]] + (potential ? potential[cell[a]] : 0);
-        cell_slope(D, g, head, stable);
-        for (int a = 1; a <= D; a++)
-            for (int d = 0; d < D; d++)
-                divergence += (u[a][d] - u[0][d]) * g[a][d];
-        for (int a = 0; a <= D && shares; a++)
-            for (int d = 0; d < D; d++)
-                carried[d] += share[a] * u[a][d];
-        const double weight = f->tau[e] * f->inverse[e], part = f->cell_volume[e] * (1.0 / (D + 1));
+            sum += pi[a][d];
+        stable[d] = weight * (stable[d] + part * sum);
+    }
+    bool all = true;
+    for (int a = 0; a <= D; a++)
+        all &= f->mobile[cell[a]] == 1;
+    for (int a = 0; a <= D; a++) {
+        double gain = divergence * (1.0 / (D + 1)), smooth = 0;
         for (int d = 0; d < D; d++) {
-            double sum = 0;
-            for (int a = 0; a <= D; a++)
-                sum += pi[a][d];
-            stable[d] = weight * (stable[d] + part * sum);
+            smooth += g[a][d] * stable[d];
+            if (shares)
+                gain += g[a][d] * carried[d];
         }
-        bool all = true;
-        for (int a = 0; a <= D; a++)
-            all &= f->mobile[cell[a]] == 1;
-        for (int a = 0; a <= D; a++) {
-            double gain = divergence * (1.0 / (D + 1)), smooth = 0;
-            for (int d = 0; d < D; d++) {
-                smooth += g[a][d] * stable[d];
-                if (shares)
-                    gain += g[a][d] * carried[d];
-            }
-            if (all || f->mobile[cell[a]] == 1)
-                f->residual[cell[a]] += smooth + gain;
-            else {
-                f->residual[cell[a]] += smooth;
-                f->withheld[cell[a]] += gain;
-            }
+        if (all || f->mobile[cell[a]] == 1)
+            to.one[to.at[a]] += smooth + gain;
+        else {
+            to.one[to.at[a]] += smooth;
+            to.wide[to.at[a]] += gain;
         }
     }
 }
 
 void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
                               const double *p) {
+    SILT_PARALLEL(f->n_node)
     for (int j = 0; j < f->n_node; j++) {
         const double asked = -(rate ? rate[j] : 0) - (drag ? drag->source[j] : 0);
         f->residual[j] = f->mobile[j] == 1 ? asked : 0;
         f->withheld[j] = f->mobile[j] == 1 ? 0 : asked;
     }
     if (f->potential || f->share)
-        BY_DIM(continuity, f, mesh, v, p, f->potential, f->share);
+        BY_CELL(SUMS(1, f->withheld, f->residual), continuity, v, p, f->potential, f->share);
     else
-        BY_DIM(continuity, f, mesh, v, p, NULL, NULL);
+        BY_CELL(SUMS(1, f->withheld, f->residual), continuity, v, p, NULL, NULL);
 }
 
-KERNEL projection(const int D, silt_fluid *f, const silt_mesh *mesh, const double *p, const double *potential) {
+KERNEL projection(const int D, const silt_fluid *f, const silt_mesh *mesh, int e, const silt_to to, const double *p, const double *potential) {
+    const int *cell = mesh->cell[e];
+    const double tau = f->tau[e], weight = tau * f->cell_volume[e];
+    double g[4][3], head[4], slope[3];
+    cell_flux(D, f, e, g);
+    for (int a = 0; a <= D; a++)
+        head[a] = p[cell[a]] + (potential ? potential[cell[a]] : 0);
+    cell_slope(D, g, head, slope);
+    for (int a = 0; a <= D; a++) {
+        to.one[to.at[a]] += weight;
+        for (int d = 0; d < D; d++)
+            to.wide[D * to.at[a] + d] -= tau * slope[d];
+    }
+}
+
+void silt_assemble_projection(silt_fluid *f, const silt_mesh *mesh, const double *p) {
+    const int D = f->dim;
     memset(f->projection, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
     memset(f->projection_weight, 0, (size_t)f->n_node * sizeof(double));
-    for (int e = 0; e < f->n_cell; e++) {
-        const int *cell = mesh->cell[e];
-        const double tau = f->tau[e], weight = tau * f->cell_volume[e];
-        double g[4][3], head[4], slope[3];
-        cell_flux(D, f, e, g);
-        for (int a = 0; a <= D; a++)
-            head[a] = p[cell[a]] + (potential ? potential[cell[a]] : 0);
-        cell_slope(D, g, head, slope);
-        for (int a = 0; a <= D; a++) {
-            f->projection_weight[cell[a]] += weight;
-            for (int d = 0; d < D; d++)
-                f->projection[D * cell[a] + d] -= tau * slope[d];
-        }
-    }
+    if (f->potential)
+        BY_CELL(SUMS(D, f->projection, f->projection_weight), projection, p, f->potential);
+    else
+        BY_CELL(SUMS(D, f->projection, f->projection_weight), projection, p, NULL);
+    SILT_PARALLEL(f->n_node)
     for (int i = 0; i < f->n_node; i++)
         if (f->projection_weight[i] > 0)
             for (int d = 0; d < D; d++)
                 f->projection[D * i + d] /= f->projection_weight[i];
 }
 
-void silt_assemble_projection(silt_fluid *f, const silt_mesh *mesh, const double *p) {
-    if (f->potential)
-        BY_DIM(projection, f, mesh, p, f->potential);
-    else
-        BY_DIM(projection, f, mesh, p, NULL);
-}
-
-KERNEL divergence(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, const double *shares,
-                  double *out) {
-    memset(out, 0, (size_t)f->n_node * sizeof(double));
-    for (int e = 0; e < f->n_cell; e++) {
-        const int *cell = mesh->cell[e];
-        const double *share = shares ? shares + (D + 1) * e : NULL;
-        double g[4][3], u[4][3], head[4], sum = 0, along[3];
-        cell_flux(D, f, e, g);
-        cell_nodal(D, v, cell, u);
-        for (int a = 0; a <= D; a++)
-            head[a] = p[cell[a]];
-        cell_slope(D, g, head, along);
-        for (int a = 1; a <= D; a++)
-            for (int d = 0; d < D; d++)
-                sum += (u[a][d] - u[0][d]) * g[a][d];
-        sum *= 1.0 / (D + 1);
-        for (int d = 0; d < D; d++) {
-            along[d] *= f->tau[e] * f->inverse[e];
-            for (int a = 0; a <= D && shares; a++)
-                along[d] += share[a] * u[a][d];
-        }
-        double rest = 0;
-        for (int a = 1; a <= D; a++) {
-            double flow = 0;
-            for (int d = 0; d < D; d++)
-                flow += g[a][d] * along[d];
-            out[cell[a]] += sum + flow;
-            rest += flow;
-        }
-        out[cell[0]] += sum - rest;
+KERNEL divergence(const int D, const silt_fluid *f, const silt_mesh *mesh, int e, const silt_to to, const double *v, const double *p,
+                  const double *shares) {
+    const int *cell = mesh->cell[e];
+    const double *share = shares ? shares + (D + 1) * e : NULL;
+    double g[4][3], u[4][3], head[4], sum = 0, along[3];
+    cell_flux(D, f, e, g);
+    cell_nodal(D, v, cell, u);
+    for (int a = 0; a <= D; a++)
+        head[a] = p[cell[a]];
+    cell_slope(D, g, head, along);
+    for (int a = 1; a <= D; a++)
+        for (int d = 0; d < D; d++)
+            sum += (u[a][d] - u[0][d]) * g[a][d];
+    sum *= 1.0 / (D + 1);
+    for (int d = 0; d < D; d++) {
+        along[d] *= f->tau[e] * f->inverse[e];
+        for (int a = 0; a <= D && shares; a++)
+            along[d] += share[a] * u[a][d];
     }
+    double rest = 0;
+    for (int a = 1; a <= D; a++) {
+        double flow = 0;
+        for (int d = 0; d < D; d++)
+            flow += g[a][d] * along[d];
+        to.one[to.at[a]] += sum + flow;
+        rest += flow;
+    }
+    to.one[to.at[0]] += sum - rest;
 }
 
 void silt_assemble_divergence(const silt_fluid *f, const silt_mesh *mesh, const double *v, const double *p, double *out) {
+    memset(out, 0, (size_t)f->n_node * sizeof(double));
     if (f->share)
-        BY_DIM(divergence, f, mesh, v, p, f->share, out);
+        BY_CELL(SUMS(1, NULL, out), divergence, v, p, f->share);
     else
-        BY_DIM(divergence, f, mesh, v, p, NULL, out);
+        BY_CELL(SUMS(1, NULL, out), divergence, v, p, NULL);
 }

@@ -1,8 +1,8 @@
 /** @file coarse.h
  * A multigrid preconditioner for symmetric positive definite matrices that look like a Laplacian: smoothed aggregation
  * (Vanek, Mandel and Brezina, Computing 56, 1996), one V-cycle with a sweep of Gauss-Seidel forward before and backward
- * after, so that it is symmetric and positive definite. Set up in O(n); the cycle works in single precision. One
- * thread, no state: the same matrix gives the same bits.
+ * after, so that it is symmetric and positive definite. Set up in O(n); the cycle works in single precision. Large
+ * levels are swept in blocks at the same time. No state: the same matrix gives the same bits, on any number of threads.
  */
 #ifndef SILT_COARSE_H
 #define SILT_COARSE_H

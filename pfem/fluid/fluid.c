@@ -32,6 +32,7 @@ void silt_fluid_clear(silt_fluid *f) {
     silt_wall_normals_clear(&f->wall_normals);
     silt_depth_clear(&f->depth);
     silt_wall_law_clear(&f->law);
+    silt_parts_clear(&f->parts);
     *f = (silt_fluid){0};
 }
 
@@ -145,14 +146,17 @@ static void find_excess(silt_fluid *f, const silt_step *s, double stiff, const d
     memset(f->excess, 0, (size_t)(D * f->n_node) * sizeof(double));
     if (s->drag)
         return;
+    SILT_PARALLEL(f->n_node)
     for (int k = 0; k < D * f->n_node; k++)
         a[k] = right[k];
+    SILT_PARALLEL(f->n_node)
     for (int i = 0; i < f->n_node; i++)
         for (int d = 0; d < D; d++)
             a[D * i + d] -= f->mass[i] * v[D * i + d] / theta_dt + (f->inertia[i] - f->mass[i] / theta_dt) * f->w[D * i + d];
     if (stiff > 0 && stiff < 0.1)
         for (int k = 0; k < D * f->n_node; k++)
             a[k] += (stiff / 0.1 - 1) * f->scratch[k];
+    SILT_PARALLEL(f->n_node)
     for (int i = 0; i < f->n_node; i++) {
         for (int d = 0; d < D; d++)
             a[D * i + d] = s->mesh->wet[i] && f->mass[i] > 0 ? a[D * i + d] / f->mass[i] : 0;
@@ -172,6 +176,7 @@ static void find_excess(silt_fluid *f, const silt_step *s, double stiff, const d
 static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, double *out) {
     const int D = f->dim;
     const double per_time = 1 / (f->theta * s->dt), *v = s->nodes->v, *g = s->scene->gravity;
+    SILT_PARALLEL(f->n_node)
     for (int i = 0; i < f->n_node; i++)
         for (int d = 0; d < D; d++)
             out[D * i + d] = f->mass[i] * (v[D * i + d] * per_time + g[d]) + (s->drag ? s->drag->push[D * i + d] : 0);
@@ -193,7 +198,7 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
         silt_tension_force(s->mesh, f->x_mid, s->scene->fluid.surface_tension, out);
     if (s->pockets)
         silt_pockets_force(s->pockets, D, 0.5 * s->dt, f->w, out);
-    silt_assemble_pressure(f, s->mesh, p, out, NULL);
+    silt_assemble_pressure(f, s->mesh, p, out);
 }
 
 // resistance of the present iterate: traction of walls, then geometry, then viscosity of every cell
@@ -251,6 +256,7 @@ static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid,
     } else {
         for (int k = 0; k < D * f->n_node && viscid; k++)
             f->force[k] -= f->scratch[k];
+        SILT_PARALLEL(f->n_node)
         for (int i = 0; i < f->n_node; i++) {
             const double stand = viscid ? f->stand[i] : 0;
             for (int d = 0; d < D; d++)
@@ -265,32 +271,55 @@ static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid,
     return SILT_OK;
 }
 
-// largest share of its volume that a node would gain or lose in the step; spray counts as a quarter of a cell. @return that node
-static int worst_residual(silt_fluid *f, const silt_step *s) {
+/** what continuity lacks in a chunk of the nodes */
+typedef struct lack {
+    double most, all, volume; // largest share of a node's volume, m3 of all, m3
+    int node;                 // that has the largest
+} lack;
+
+static lack lack_of(const silt_fluid *f, const silt_step *s, int first, int last) {
     const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
-    int worst = 0;
-    double lacking = 0, all = 0;
-    f->worst = 0;
-    for (int j = 0; j < f->n_node; j++) {
+    lack l = {0};
+    for (int j = first; j < last; j++) {
         if (!s->mesh->wet[j] || (!consistent && s->mesh->surface[j]) || f->mobile[j] != 1)
             continue;
         const double h = silt_node_h(s->nodes, j, s->scene->fluid.size);
         const double share = fabs(f->residual[j]) * s->dt / silt_max(f->volume[j], FLUID_NODE * (f->dim == 3 ? h * h * h : h * h));
-        if (share > f->worst || !isfinite(share)) {
-            f->worst = share;
-            worst = j;
+        if (share > l.most || !isfinite(share)) {
+            l.most = share;
+            l.node = j;
         }
-        lacking += fabs(f->residual[j]) * s->dt;
-        all += f->volume[j];
+        l.all += fabs(f->residual[j]) * s->dt;
+        l.volume += f->volume[j];
     }
-    f->lacking = all > 0 ? lacking / all : 0;
-    return worst;
+    return l;
+}
+
+// largest share of its volume that a node would gain or lose in the step; spray counts as a quarter of a cell. @return that node
+static int worst_residual(silt_fluid *f, const silt_step *s) {
+    const int n = f->n_node;
+    lack part[CHUNK_MOST], all = {0};
+    SILT_PARALLEL(n)
+    for (int c = 0; c < silt_chunks(n); c++)
+        part[c] = lack_of(f, s, silt_chunk_first(n, c), silt_chunk_first(n, c + 1));
+    for (int c = 0; c < silt_chunks(n); c++) {
+        if (part[c].most > all.most || !isfinite(part[c].most)) {
+            all.most = part[c].most;
+            all.node = part[c].node;
+        }
+        all.all += part[c].all;
+        all.volume += part[c].volume;
+    }
+    f->worst = all.most;
+    f->lacking = all.volume > 0 ? all.all / all.volume : 0;
+    return all.node;
 }
 
 // what continuity lacks with f->star. @return the node that lacks most
 static int star_continuity(silt_fluid *f, const silt_step *s, const double *p) {
     const double *v = f->star;
     if (f->shift) {
+        SILT_PARALLEL(f->n_node)
         for (int k = 0; k < f->dim * f->n_node; k++)
             f->scratch[k] = f->star[k] + f->shift[k];
         v = f->scratch;
@@ -303,7 +332,8 @@ static int star_continuity(silt_fluid *f, const silt_step *s, const double *p) {
 static void correct(silt_fluid *f, const silt_step *s, const double *q, double *v) {
     const int D = f->dim;
     memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
-    silt_assemble_pressure(f, s->mesh, q, f->scratch, NULL);
+    silt_assemble_pressure(f, s->mesh, q, f->scratch);
+    SILT_PARALLEL(f->n_node)
     for (int i = 0; i < f->n_node; i++) {
         if (!s->mesh->wet[i])
             continue;
@@ -319,6 +349,7 @@ static void correct(silt_fluid *f, const silt_step *s, const double *q, double *
 // increment = -matrix^-1 residual, in 3-D to `tolerance`, or to what is worth having where the step is solved far
 static silt_status pressure_increment(silt_fluid *f, const silt_step *s, double tolerance, silt_error *err) {
     silt_status status;
+    SILT_PARALLEL(f->n_node)
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
     tolerance = silt_min(tolerance, FLUID_INNER * s->scene->fluid.tolerance);
@@ -398,7 +429,7 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
     f->momentum_scale = 0;
     f->worked = 0;
     if (drag)
-        silt_assemble_pressure(f, s->mesh, p, f->scratch, lost);
+        silt_assemble_pressure_lost(f, s->mesh, p, lost);
     for (int i = 0; i < f->n_node; i++) {
         if (!s->mesh->wet[i]) {
             for (int d = 0; d < D; d++)
@@ -542,7 +573,7 @@ static double strictness(const silt_fluid *f, const silt_step *s) {
 
 // Small cells of spray turn while they are solved, and are not waited for when all that is lacking is little
 static bool spray_lags(const silt_fluid *f, double tolerance) {
-    return f->iterations >= FLUID_SPRAY && f->lacking < 0.1 * tolerance && f->worst < 1e3 * tolerance;
+    return f->iterations >= FLUID_SPRAY && f->lacking < 0.01 * tolerance && f->worst < 1e3 * tolerance;
 }
 
 static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, silt_error *err) {
@@ -601,6 +632,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->w));
         if (refresh)
             find_excess(f, s, stiff, f->force);
+        SILT_PARALLEL(f->n_node)
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
         // on the way the momentum is solved no further than it is worth; the iterate that ends it is solved out
@@ -655,6 +687,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             SILT_TRY(prepare_stiff(f, s, &twofold, err)); // viscosity may have grown since the first iteration
             SILT_TRY(correct_stiff(f, err));
         }
+        SILT_PARALLEL(f->n_node)
         for (int i = 0; i < f->n_node; i++)
             p[i] += f->increment[i];
         if (stiff > FLUID_STIFF || squeezed)
@@ -668,6 +701,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     const silt_fluid_def *def = &s->scene->fluid;
     silt_nodes *nodes = s->nodes;
     fluid_reserve(f, s);
+    silt_parts_make(&f->parts, s->mesh);
     const int D = f->dim;
     if (!f->pressure)
         f->pressure = silt_pressure_create();

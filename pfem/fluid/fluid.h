@@ -7,6 +7,7 @@
 #ifndef SILT_FLUID_H
 #define SILT_FLUID_H
 
+#include "parts.h"
 #include "pocket.h"
 #include "viscosity.h"
 
@@ -66,6 +67,7 @@ typedef struct silt_fluid {
     int64_t piece_revision; // of the mesh that these pieces belong to
     int piece_capacity, walk_capacity, closed_capacity;
     double mu_max;        // Pa s, largest of mu
+    silt_parts parts;     // owned, the cells, one part a thread
     bool shaped;          // shapes and x_mid are of this step
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned
@@ -136,8 +138,10 @@ void silt_levels_load(silt_fluid *fluid, const silt_step *step);
 void silt_assemble_geometry(silt_fluid *fluid, const silt_step *step, double dt);
 
 // assemble.c ---------------------------------------------------------------------------------------------
-/** out += G p; adds to lost (may be NULL) what acts on the grains */
-void silt_assemble_pressure(const silt_fluid *fluid, const silt_mesh *mesh, const double *p, double *out, double *lost);
+/** out += G p */
+void silt_assemble_pressure(const silt_fluid *fluid, const silt_mesh *mesh, const double *p, double *out);
+/** lost += what of G p acts on the grains */
+void silt_assemble_pressure_lost(const silt_fluid *fluid, const silt_mesh *mesh, const double *p, double lost[3]);
 /** out -= int N_i grad potential: at rest the pressure answers it to rounding, on any mesh */
 void silt_assemble_potential(const silt_fluid *fluid, const silt_mesh *mesh, double *out);
 /** out += factor K v: viscous force, deviatoric */

@@ -120,9 +120,9 @@ static inline __attribute__((always_inline)) int places(const int D, const silt_
     return e + LANES <= f->n_cell ? LANES : f->n_cell - e;
 }
 
-// volumes where the nodes are
-KERNEL starts(const int D, const double period, silt_fluid *f, const silt_mesh *mesh, const double *x) {
-    for (int e = 0; e < f->n_cell; e += LANES) {
+// volumes where the nodes are, of the cells of a part
+KERNEL starts(const int D, const double period, silt_fluid *f, const silt_mesh *mesh, const double *x, int part) {
+    for (int e = f->parts.first[part]; e < f->parts.first[part + 1]; e += LANES) {
         int at[4][LANES];
         lane c[4][3], flux[4][3];
         const int many = places(D, f, mesh, e, at);
@@ -145,9 +145,12 @@ KERNEL store_flux(const int D, lane flux[4][3], bool both, double *out) {
     }
 }
 
-KERNEL shapes(const int D, const double period, silt_fluid *f, const silt_mesh *mesh, const double *x) {
-    memset(f->volume, 0, (size_t)f->n_node * sizeof(double));
-    for (int e = 0; e < f->n_cell; e += LANES) {
+// shapes and volumes of the cells of a part; its border cells come next, from b on
+KERNEL shapes(const int D, const double period, silt_fluid *f, const silt_mesh *mesh, const double *x, int part) {
+    const silt_parts *parts = &f->parts;
+    int b = parts->border[part];
+    const int end = parts->border[part + 1];
+    for (int e = parts->first[part]; e < parts->first[part + 1]; e += LANES) {
         int at[4][LANES];
         silt_shapes s;
         const bool both = places(D, f, mesh, e, at) == LANES;
@@ -159,25 +162,42 @@ KERNEL shapes(const int D, const double period, silt_fluid *f, const silt_mesh *
             s = mended;
         }
         store_flux(D, s.flux, both, f->flux + (D + 1) * D * e);
-        const lane part = s.volume * (1.0 / (D + 1));
+        const lane share = s.volume * (1.0 / (D + 1));
         for (int l = 0; l < LANES && (l == 0 || both); l++) {
             f->cell_volume[e + l] = s.volume[l];
             f->inverse[e + l] = s.inverse[l];
+            const bool border = b < end && parts->cell[b] == e + l;
+            const silt_to to = border ? silt_parts_aside(parts, b) : (silt_to){NULL, f->volume, mesh->cell[e + l]};
             for (int a = 0; a <= D; a++)
-                f->volume[mesh->cell[e + l][a]] += part[l];
+                to.one[to.at[a]] += share[l];
+            if (border)
+                silt_parts_settle(parts, mesh, SUMS(1, NULL, f->volume), b++);
         }
     }
 }
 
-KERNEL shapes_anywhere(const int D, silt_fluid *f, const silt_mesh *mesh, const double *x) {
+KERNEL shapes_part(const int D, silt_fluid *f, const silt_mesh *mesh, const double *x, int part) {
     if (!f->shaped && mesh->period[0] > 0)
-        starts(D, mesh->period[0], f, mesh, x);
+        starts(D, mesh->period[0], f, mesh, x, part);
     else if (!f->shaped)
-        starts(D, 0, f, mesh, x);
+        starts(D, 0, f, mesh, x, part);
     if (mesh->period[0] > 0)
-        shapes(D, mesh->period[0], f, mesh, x);
+        shapes(D, mesh->period[0], f, mesh, x, part);
     else
-        shapes(D, 0, f, mesh, x);
+        shapes(D, 0, f, mesh, x, part);
+}
+
+static void shapes_anywhere(silt_fluid *f, const silt_mesh *mesh, const double *x) {
+    memset(f->volume, 0, (size_t)f->n_node * sizeof(double));
+    SILT_PRAGMA(omp parallel num_threads(f->parts.n))
+    {
+        SILT_PRAGMA(omp for schedule(static))
+        for (int part = 0; part < f->parts.n; part++)
+            BY_DIM(shapes_part, f, mesh, x, part);
+        SILT_PRAGMA(omp for schedule(static))
+        for (int part = 0; part < f->parts.n; part++)
+            silt_parts_finish(&f->parts, SUMS(1, NULL, f->volume), part);
+    }
     f->shaped = true;
 }
 
@@ -193,12 +213,14 @@ static bool midpoints(silt_fluid *f, const double *x, double dt) {
     double *x_mid = f->x_mid;
     const double *w = f->w, *shift = f->shift, half = 0.5 * dt;
     const int n = f->dim * f->n_node;
-    for (int k = 0; k < n && !f->belt; k++) {
+    const int sure = f->belt ? 0 : n;
+    SILT_PRAGMA(omp parallel for schedule(static) num_threads(silt_threads(n)) reduction(|:moved))
+    for (int k = 0; k < sure; k++) {
         const double to = x[k] + half * (shift ? w[k] + shift[k] : w[k]);
         moved |= bits_of(to) ^ bits_of(x_mid[k]);
         x_mid[k] = to;
     }
-    for (int k = 0; k < n && f->belt; k++) {
+    for (int k = sure; k < n; k++) {
         const double to = x[k] + half * silt_mesh_velocity(f, k);
         moved |= bits_of(to) ^ bits_of(x_mid[k]);
         x_mid[k] = to;
@@ -245,14 +267,20 @@ static inline double inverse_cube_root(double x) {
 // stabilisation: 1/(2 rho/(theta dt) + 8 mu/(3 h^2)), h^2 twice the area of a triangle, of a tetrahedron 0.866 times the square of
 // a regular one's edge
 static void stabilisation(silt_fluid *f, double inertia) {
-    if (f->dim == 2)
-        for (int e = 0; e < f->n_cell; e++)
-            f->tau[e] = 1 / (inertia + 4.0 / 3 * f->mu[e] * f->inverse[e]);
-    else
-        for (int e = 0; e < f->n_cell; e++) {
-            const double per_square = f->inverse[e] * inverse_cube_root(f->inverse[e]);
-            f->tau[e] = 1 / (inertia + PER_SQUARE * f->mu[e] * per_square);
-        }
+    const int n = f->n_cell;
+    const double *mu = f->mu, *inverse = f->inverse;
+    double *tau = f->tau;
+    if (f->dim == 2) {
+        SILT_PARALLEL(n)
+        for (int e = 0; e < n; e++)
+            tau[e] = 1 / (inertia + 4.0 / 3 * mu[e] * inverse[e]);
+        return;
+    }
+    SILT_PARALLEL(n)
+    for (int e = 0; e < n; e++) {
+        const double per_square = inverse[e] * inverse_cube_root(inverse[e]);
+        tau[e] = 1 / (inertia + PER_SQUARE * mu[e] * per_square);
+    }
 }
 
 void silt_assemble_geometry(silt_fluid *f, const silt_step *step, double dt) {
@@ -261,18 +289,19 @@ void silt_assemble_geometry(silt_fluid *f, const silt_step *step, double dt) {
     const double rho = scene->fluid.density, per_time = 1 / (f->theta * step->dt);
     // most steps ask twice or three times for what is there: a fifth of their geometry
     if (midpoints(f, step->nodes->x, dt) || !f->shaped) {
-        BY_DIM(shapes_anywhere, f, step->mesh, step->nodes->x);
+        shapes_anywhere(f, step->mesh, step->nodes->x);
         if (f->wall_normals.n_row)
             silt_hold_bent(f, step);
     }
     stabilisation(f, 2 * rho * per_time);
     if (drag)
         BY_DIM(shares, f, step->mesh, drag->solid, rho);
-    else
-        for (int i = 0; i < f->n_node; i++)
+    SILT_PARALLEL(f->n_node)
+    for (int i = 0; i < f->n_node; i++) {
+        if (!drag)
             f->mass[i] = rho * f->volume[i];
-    for (int i = 0; i < f->n_node; i++)
         f->inertia[i] = step->mesh->wet[i] ? f->mass[i] * per_time + (drag ? drag->coefficient[i] : 0) + f->friction[i] : 1;
+    }
     for (int i = 0; f->potential && i < f->n_node; i++)
         f->potential[i] = scene->fluid.density * silt_formula_potential(&scene->fluid.force, f->x_mid + f->dim * i);
 }

@@ -16,57 +16,83 @@ typedef struct silt_descent {
     int iterations;
 } silt_descent;
 
-// Residual of v, from what silt_momentum_look left; first direction; what to reach; the bound. With the diagonal D of A = inertia + K,
-// v + D^-1 r leaves the residual (D - A) D^-1 r. In the norm of D^-1 that is at most the bound times r: K and its diagonal are
-// positive, and a cell's w K w = mu V (L:L + L:L^T - 2/3 tr^2) <= 2 mu V L:L is no more than 2 (dim + 1)/(1 + 4/(3 dim)) times what
-// the cell has in the diagonal.
-KERNEL begin(const int D, silt_fluid *f, const double *right, const double *v, double share, double drop, silt_descent *c) {
-    double *r = f->cg[0], *s = f->cg[1], scale = 0, whole = 0, rz = 0, most = 0;
-    for (int i = 0; i < f->n_node; i++) {
+/** what a chunk of the nodes adds */
+typedef struct silt_tally {
+    double size, scale, whole, most; // r . D^-1 r; the same of the right side, its free components and all; share of K in the diagonal
+} silt_tally;
+
+KERNEL begin_chunk(const int D, silt_fluid *f, int first, int last, int c, const double *right, const double *v, silt_tally *tally) {
+    double *r = f->cg[0], *s = f->cg[1];
+    silt_tally t = {0};
+    for (int i = first; i < last; i++) {
         const double per = 1 / f->increment[i];
         double loose[3];
-        most = silt_max(most, (f->increment[i] - f->inertia[i]) * per);
+        t.most = silt_max(t.most, (f->increment[i] - f->inertia[i]) * per);
         for (int d = 0; d < D; d++) {
             const int k = D * i + d;
             loose[d] = right[k];
             r[k] = right[k] - f->inertia[i] * v[k] - f->scratch[k];
-            whole += silt_square(right[k]) * per;
+            t.whole += silt_square(right[k]) * per;
         }
         silt_hold_project(f, i, loose);
         silt_hold_project(f, i, r + D * i);
         for (int d = 0; d < D; d++) {
             const int k = D * i + d;
             s[k] = r[k] * per;
-            rz += r[k] * s[k];
-            scale += silt_square(loose[d]) * per;
+            t.size += r[k] * s[k];
+            t.scale += silt_square(loose[d]) * per;
         }
     }
+    tally[c] = t;
+}
+
+// Residual of v, from what silt_momentum_look left; first direction; what to reach; the bound. With the diagonal D of A = inertia + K,
+// v + D^-1 r leaves the residual (D - A) D^-1 r. In the norm of D^-1 that is at most the bound times r: K and its diagonal are
+// positive, and a cell's w K w = mu V (L:L + L:L^T - 2/3 tr^2) <= 2 mu V L:L is no more than 2 (dim + 1)/(1 + 4/(3 dim)) times what
+// the cell has in the diagonal.
+static silt_descent begin(silt_fluid *f, const double *right, const double *v, double share, double drop) {
+    silt_tally tally[CHUNK_MOST], all = {0};
+    BY_CHUNK(begin_chunk, right, v, tally);
+    for (int c = 0; c < silt_chunks(f->n_node); c++) {
+        all.size += tally[c].size;
+        all.scale += tally[c].scale;
+        all.whole += tally[c].whole;
+        all.most = silt_max(all.most, tally[c].most);
+    }
     // what walls hold is no measure of what is solved for, only of its rounding
-    c->strict = silt_max(silt_square(share) * scale, 1e-30 * whole);
-    c->target = silt_max(c->strict, silt_square(drop) * rz);
-    c->rz = c->size = rz;
-    c->bound = 2 * (D + 1) / (1 + 4.0 / (3 * D)) * most;
+    const double strict = silt_max(silt_square(share) * all.scale, 1e-30 * all.whole);
+    return (silt_descent){.rz = all.size, .size = all.size, .strict = strict, .target = silt_max(strict, silt_square(drop) * all.size),
+                          .bound = 2 * (f->dim + 1) / (1 + 4.0 / (3 * f->dim)) * all.most};
+}
+
+KERNEL product_chunk(const int D, silt_fluid *f, int first, int last, int c, double *part) {
+    const double *s = f->cg[1];
+    double *as = f->cg[2];
+    part[c] = 0;
+    for (int i = first; i < last; i++) {
+        silt_hold_project(f, i, as + D * i);
+        for (int d = 0; d < D; d++)
+            part[c] += s[D * i + d] * as[D * i + d];
+    }
 }
 
 // as = A s. @return s . A s
-static inline __attribute__((always_inline)) double along(const int D, silt_fluid *f, const silt_mesh *mesh) {
+static double along(silt_fluid *f, const silt_mesh *mesh) {
     const double *s = f->cg[1];
-    double *as = f->cg[2], sum = 0;
+    double *as = f->cg[2], part[CHUNK_MOST];
+    const int D = f->dim;
+    SILT_PARALLEL(f->n_node)
     for (int i = 0; i < f->n_node; i++)
         for (int d = 0; d < D; d++)
             as[D * i + d] = f->inertia[i] * s[D * i + d];
     silt_assemble_viscous(f, mesh, s, 1, as);
-    for (int i = 0; i < f->n_node; i++) {
-        silt_hold_project(f, i, as + D * i);
-        for (int d = 0; d < D; d++)
-            sum += s[D * i + d] * as[D * i + d];
-    }
-    return sum;
+    BY_CHUNK(product_chunk, part);
+    return silt_total(silt_chunks(f->n_node), part);
 }
 
-KERNEL advance(const int D, silt_fluid *f, double alpha, double *v, silt_descent *c) {
+KERNEL advance_chunk(const int D, silt_fluid *f, int first, int last, int c, double alpha, double *v, double *part) {
     double *r = f->cg[0], *s = f->cg[1], *as = f->cg[2], size = 0;
-    for (int i = 0; i < f->n_node; i++) {
+    for (int i = first; i < last; i++) {
         const double per = 1 / f->increment[i];
         for (int d = 0; d < D; d++) {
             const int k = D * i + d;
@@ -75,53 +101,54 @@ KERNEL advance(const int D, silt_fluid *f, double alpha, double *v, silt_descent
             size += r[k] * r[k] * per;
         }
     }
-    c->size = size;
+    part[c] = size;
+}
+
+// v += alpha s, r -= alpha as. @return r . D^-1 r
+static double advance(silt_fluid *f, double alpha, double *v) {
+    double part[CHUNK_MOST];
+    BY_CHUNK(advance_chunk, alpha, v, part);
+    return silt_total(silt_chunks(f->n_node), part);
 }
 
 // s = z + beta s; z: NULL for D^-1 r
-KERNEL turn(const int D, silt_fluid *f, const double *z, double beta) {
+KERNEL turn_chunk(const int D, silt_fluid *f, int first, int last, int c, const double *z, double beta) {
+    (void)c;
     double *r = f->cg[0], *s = f->cg[1];
-    for (int i = 0; i < f->n_node; i++)
+    for (int i = first; i < last; i++)
         for (int d = 0; d < D; d++)
             s[D * i + d] = (z ? z[D * i + d] : r[D * i + d] / f->increment[i]) + beta * s[D * i + d];
 }
 
-static double dot(int n, const double *a, const double *b) {
-    double sum = 0;
-    for (int k = 0; k < n; k++)
-        sum += a[k] * b[k];
-    return sum;
-}
-
-static inline __attribute__((always_inline)) silt_status solve(const int D, silt_fluid *f, const silt_step *step, const double *right,
-                                                                double drop, double *v, bool *solved, silt_error *err) {
-    const int n = f->n_node;
+silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const double *right, double drop, double *v, bool *solved,
+                                silt_error *err) {
+    const int n = f->n_node, D = f->dim;
     const bool factored = silt_stiff_ready(f->stiff, false);
     double *r = f->cg[0], *s = f->cg[1], *z = factored ? f->scratch : NULL;
-    silt_descent c = {0};
-    begin(D, f, right, v, silt_clamp(1e-6 * step->scene->fluid.tolerance, 1e-12, 1e-9), drop, &c);
+    silt_descent c = begin(f, right, v, silt_clamp(1e-6 * step->scene->fluid.tolerance, 1e-12, 1e-9), drop);
     if (factored && c.size > c.target) {
         SILT_TRY(silt_stiff_momentum(f->stiff, f, r, s, err));
-        c.rz = dot(D * n, r, s);
+        c.rz = silt_products(D * n, r, s);
     }
     while (c.size > c.target) {
         if (++c.iterations > MOMENTUM_LIMIT)
             return silt_fail(err, SILT_FAILED, "the momentum system did not converge in %d iterations (%d nodes)", MOMENTUM_LIMIT, n);
         // the last step needs no product where viscosity is small: that it is enough is known beforehand
         if (!factored && silt_square(c.bound) * c.size <= c.target) {
+            SILT_PARALLEL(n)
             for (int i = 0; i < n; i++)
                 for (int d = 0; d < D; d++)
                     v[D * i + d] += r[D * i + d] / f->increment[i];
             c.size *= silt_square(c.bound);
             break;
         }
-        advance(D, f, c.rz / along(D, f, step->mesh), v, &c);
+        c.size = advance(f, c.rz / along(f, step->mesh), v);
         double fresh = c.size;
         if (factored && c.size > c.target) {
             SILT_TRY(silt_stiff_momentum(f->stiff, f, r, z, err));
-            fresh = dot(D * n, r, z);
+            fresh = silt_products(D * n, r, z);
         }
-        turn(D, f, z, fresh / c.rz);
+        BY_CHUNK(turn_chunk, z, fresh / c.rz);
         c.rz = fresh;
         if (!isfinite(c.rz))
             return silt_fail(err, SILT_FAILED, "the momentum system gave numbers that are not finite");
@@ -129,9 +156,4 @@ static inline __attribute__((always_inline)) silt_status solve(const int D, silt
     f->momentum_iterations += c.iterations;
     *solved = c.size <= c.strict;
     return SILT_OK;
-}
-
-silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const double *right, double drop, double *v, bool *solved,
-                                silt_error *err) {
-    return f->dim == 3 ? solve(3, f, step, right, drop, v, solved, err) : solve(2, f, step, right, drop, v, solved, err);
 }

@@ -5,6 +5,7 @@
 // step's iteration.
 #include "space.h"
 #include "coarse.h"
+#include "parallel.h"
 
 #define CG_LIMIT    400
 #define SPACE_STIFF 1e-3 // of the viscous part of an increment, which others mend
@@ -20,12 +21,15 @@ struct silt_space {
     double *stiff;         // owned, the same way, L and what stands for viscosity; only where that is stiff
     double *extra;         // owned, per node: what pins closed water, on the diagonal
     double *weight;        // owned, per cell: of L, and of L and S's Laplacian
-    int *place;            // owned, per node: where it stands among the neighbours of the node at hand
+    int *place;            // owned, per part and node: where it stands among the neighbours of the node at hand
     double *r, *ad;        // owned, per node, of conjugate gradients
     float *d;              // owned, the same: whatever is rounded in a direction, x and r go along the same one
     silt_coarse *coarse, *coarse_stiff; // owned
+    int n_part, row[PARALLEL_MOST + 1]; // parts of the rows, one a thread, and where they begin
+    uint8_t *border;       // owned, per row: it gives to a node of an earlier part (that of the first row that gives to it)
+    double *aside;         // owned, along the neighbour lists and after each a place more: what is given to such
     int stiff_capacity, entry_capacity, sum_capacity, compact_capacity, extra_capacity, weight_capacity, place_capacity,
-        r_capacity, ad_capacity, d_capacity;
+        r_capacity, ad_capacity, d_capacity, border_capacity, aside_capacity;
 };
 
 void silt_space_free(silt_space **space) {
@@ -42,6 +46,8 @@ void silt_space_free(silt_space **space) {
     free(q->r);
     free(q->ad);
     free(q->d);
+    free(q->border);
+    free(q->aside);
     silt_coarse_free(&q->coarse);
     silt_coarse_free(&q->coarse_stiff);
     free(q);
@@ -49,6 +55,7 @@ void silt_space_free(silt_space **space) {
 }
 
 static void weigh_cells(silt_space *q, const silt_fluid *f, const silt_mesh *mesh) {
+    SILT_PARALLEL(mesh->n_cell)
     for (int e = 0; e < mesh->n_cell; e++) {
         double inertia = 0, volume = 0;
         for (int c = 0; c < 4; c++) {
@@ -74,7 +81,7 @@ static void mobility(const silt_fluid *f, const silt_mesh *mesh, int e, const do
 }
 
 // one row of G, L and the compact Laplacian, from the cells of the node
-static void row_gather(const silt_space *q, const silt_fluid *f, const silt_mesh *mesh, int i, double (*row)[4],
+static void row_gather(const silt_space *q, const silt_fluid *f, const silt_mesh *mesh, int i, const int *place, double (*row)[4],
                        double *compact) {
     for (int k = mesh->node_cell_start[i]; k < mesh->node_cell_start[i + 1]; k++) {
         const int e = mesh->node_cell[k], *cell = mesh->cell[e];
@@ -88,7 +95,7 @@ static void row_gather(const silt_space *q, const silt_fluid *f, const silt_mesh
         if (held)
             mobility(f, mesh, e, own, moved);
         for (int c = 0; c < 4; c++) {
-            const int at = q->place[cell[c]];
+            const int at = place[cell[c]];
             const double *other = flux + 3 * c, along = own[0] * other[0] + own[1] * other[1] + own[2] * other[2];
             for (int d = 0; d < 3; d++)
                 row[at][d] += 0.25 * own[d] + share * other[d];
@@ -116,24 +123,29 @@ static double fluidity(const silt_fluid *f, const silt_mesh *mesh, int i) {
     return mesh->wet[i] ? sum : 1;
 }
 
-static void rows_build(silt_space *q, const silt_fluid *f, const silt_mesh *mesh, const uint8_t *pinned, bool stiff) {
-    uint8_t *given = silt_alloc((size_t)q->n + 1, 1);
+// where rows of a part give to nodes of earlier ones
+static inline bool given_late(const silt_mesh *mesh, int first, int node) { return mesh->neighbour[mesh->neighbour_start[node]] < first; }
+
+static void rows_of_part(silt_space *q, const silt_fluid *f, const silt_mesh *mesh, const uint8_t *pinned, const uint8_t *given, bool stiff,
+                         int part) {
     double(*row)[4] = NULL;
-    int row_capacity = 0;
-    mark_given(mesh, given);
-    weigh_cells(q, f, mesh);
-    for (int i = 0; i < q->n; i++) {
+    int row_capacity = 0, *place = q->place + (size_t)part * (size_t)q->n;
+    for (int i = q->row[part]; i < q->row[part + 1]; i++) {
         const int first = mesh->neighbour_start[i], count = mesh->neighbour_start[i + 1] - first;
         double *compact = q->compact + first, sum[3] = {0};
         int self = 0;
+        bool late = false;
         SILT_RESERVE(row, row_capacity, count);
         memset(row, 0, (size_t)count * sizeof *row);
         memset(compact, 0, (size_t)count * sizeof *compact);
         for (int k = 0; k < count; k++) {
-            q->place[mesh->neighbour[first + k]] = k;
-            self = mesh->neighbour[first + k] == i ? k : self;
+            const int j = mesh->neighbour[first + k];
+            place[j] = k;
+            self = j == i ? k : self;
+            late |= part && given_late(mesh, q->row[part], j);
         }
-        row_gather(q, f, mesh, i, row, compact);
+        q->border[i] = late;
+        row_gather(q, f, mesh, i, place, row, compact);
         const double scale = f->hold[i] == HOLD_ALL || !mesh->wet[i] ? 0 : 1 / sqrt(f->inertia[i]);
         for (int k = 0; k < count; k++) {
             silt_hold_project(f, i, row[k]);
@@ -152,6 +164,15 @@ static void rows_build(silt_space *q, const silt_fluid *f, const silt_mesh *mesh
         compact[self] += q->extra[i];
     }
     free(row);
+}
+
+static void rows_build(silt_space *q, const silt_fluid *f, const silt_mesh *mesh, const uint8_t *pinned, bool stiff) {
+    uint8_t *given = silt_alloc((size_t)q->n + 1, 1);
+    mark_given(mesh, given);
+    weigh_cells(q, f, mesh);
+    SILT_PARALLEL(q->n)
+    for (int part = 0; part < q->n_part; part++)
+        rows_of_part(q, f, mesh, pinned, given, stiff, part);
     free(given);
 }
 
@@ -170,7 +191,13 @@ silt_status silt_space_build(silt_space **space, const silt_fluid *f, const silt
         SILT_RESERVE(q->stiff, q->stiff_capacity, filled + 1);
     SILT_RESERVE(q->extra, q->extra_capacity, q->n + 1);
     SILT_RESERVE(q->weight, q->weight_capacity, 2 * mesh->n_cell + 1);
-    SILT_RESERVE(q->place, q->place_capacity, q->n + 1);
+    q->n_part = silt_threads(q->n);
+    for (int part = 0; part <= q->n_part; part++) // chunks, which the curvature is summed by, are not cut
+        q->row[part] = silt_chunk_first(q->n, silt_chunks(q->n) * part / q->n_part);
+    SILT_RESERVE(q->border, q->border_capacity, q->n + 1);
+    if (q->n_part > 1)
+        SILT_RESERVE(q->aside, q->aside_capacity, filled + q->n + 1);
+    SILT_RESERVE(q->place, q->place_capacity, q->n_part * q->n + 1);
     SILT_RESERVE(q->sum, q->sum_capacity, q->n + 1);
     SILT_RESERVE(q->r, q->r_capacity, q->n + 1);
     SILT_RESERVE(q->ad, q->ad_capacity, q->n + 1);
@@ -184,51 +211,98 @@ silt_status silt_space_build(silt_space **space, const silt_fluid *f, const silt
                 : silt_fail(err, SILT_FAILED, "the pressure matrix is not positive definite (%d nodes)", q->n);
 }
 
+// what row i of the operator gives: to its neighbours as it goes, the border's aside. @return x_i times the row's share
+static inline __attribute__((always_inline)) double row_apply(const silt_space *q, const float *x, double *out, int i, int late_before) {
+    const silt_mesh *mesh = q->mesh;
+    const int first = mesh->neighbour_start[i], last = mesh->neighbour_start[i + 1];
+    double *aside = q->aside + first + i;
+    const float own = x[i];
+    four u = q->sum[i] * own;
+    for (int k = first; k < last; k++)
+        u += q->entry[k] * (x[mesh->neighbour[k]] - own);
+    const float l = u[3];
+    u[3] = 0;
+    double mine = l;
+    for (int k = first; k < last; k++) {
+        const four t = q->entry[k] * u;
+        const double give = t[0] + t[1] + t[2];
+        const int j = mesh->neighbour[k];
+        if (late_before && given_late(mesh, late_before, j))
+            aside[k - first] = give;
+        else
+            out[j] += give;
+        mine -= give;
+    }
+    const four t = q->sum[i] * u, square = u * u;
+    mine += t[0] + t[1] + t[2];
+    if (late_before && given_late(mesh, late_before, i))
+        aside[last - first] = mine;
+    else
+        out[i] += mine;
+    return (double)(square[0] + square[1] + square[2]) + (double)own * (l + q->extra[i] * own);
+}
+
+// adds what a border row has put aside, in the order in which it was given
+static void row_finish(const silt_space *q, double *out, int i, int late_before) {
+    const silt_mesh *mesh = q->mesh;
+    const int first = mesh->neighbour_start[i], last = mesh->neighbour_start[i + 1];
+    const double *aside = q->aside + first + i;
+    for (int k = first; k < last; k++)
+        if (given_late(mesh, late_before, mesh->neighbour[k]))
+            out[mesh->neighbour[k]] += aside[k - first];
+    if (given_late(mesh, late_before, i))
+        out[i] += aside[last - first];
+}
+
 // out = (S + L) x, a row's entries from memory once. @return x . out
 static double operator_apply(const silt_space *q, const float *x, double *out) {
-    const silt_mesh *mesh = q->mesh;
-    double curvature = 0;
-    for (int i = 0; i < q->n; i++)
+    const int n = q->n, n_chunk = silt_chunks(n);
+    double curvature[CHUNK_MOST];
+    SILT_PARALLEL(n)
+    for (int i = 0; i < n; i++)
         out[i] = q->extra[i] * x[i];
-    for (int i = 0; i < q->n; i++) {
-        const int first = mesh->neighbour_start[i], last = mesh->neighbour_start[i + 1];
-        const float own = x[i];
-        four u = q->sum[i] * own;
-        for (int k = first; k < last; k++)
-            u += q->entry[k] * (x[mesh->neighbour[k]] - own);
-        const float l = u[3];
-        u[3] = 0;
-        double mine = l;
-        for (int k = first; k < last; k++) {
-            const four t = q->entry[k] * u;
-            const double give = t[0] + t[1] + t[2];
-            out[mesh->neighbour[k]] += give;
-            mine -= give;
+    SILT_PRAGMA(omp parallel for schedule(static) num_threads(q->n_part))
+    for (int part = 0; part < q->n_part; part++)
+        for (int c = n_chunk * part / q->n_part; c < n_chunk * (part + 1) / q->n_part; c++) {
+            double sum = 0;
+            for (int i = silt_chunk_first(n, c); i < silt_chunk_first(n, c + 1); i++)
+                sum += part && q->border[i] ? row_apply(q, x, out, i, q->row[part]) : row_apply(q, x, out, i, 0);
+            curvature[c] = sum;
         }
-        const four t = q->sum[i] * u, square = u * u;
-        out[i] += mine + (t[0] + t[1] + t[2]);
-        curvature += (double)(square[0] + square[1] + square[2]) + (double)own * (l + q->extra[i] * own);
-    }
-    return curvature;
+    for (int part = 1; part < q->n_part; part++)
+        for (int i = q->row[part]; i < q->row[part + 1]; i++)
+            if (q->border[i])
+                row_finish(q, out, i, q->row[part]);
+    return silt_total(n_chunk, curvature);
 }
 
 static double stiff_apply(const silt_space *q, const float *x, double *out) {
-    double curvature = 0;
-    for (int i = 0; i < q->n; i++) {
-        double sum = 0;
-        for (int k = q->mesh->neighbour_start[i]; k < q->mesh->neighbour_start[i + 1]; k++)
-            sum += q->stiff[k] * x[q->mesh->neighbour[k]];
-        out[i] = sum;
-        curvature += x[i] * sum;
+    double curvature[CHUNK_MOST];
+    const int n = q->n;
+    SILT_PARALLEL(n)
+    for (int c = 0; c < silt_chunks(n); c++) {
+        curvature[c] = 0;
+        for (int i = silt_chunk_first(n, c); i < silt_chunk_first(n, c + 1); i++) {
+            double sum = 0;
+            for (int k = q->mesh->neighbour_start[i]; k < q->mesh->neighbour_start[i + 1]; k++)
+                sum += q->stiff[k] * x[q->mesh->neighbour[k]];
+            out[i] = sum;
+            curvature[c] += x[i] * sum;
+        }
     }
-    return curvature;
+    return silt_total(silt_chunks(n), curvature);
 }
 
 static double dot(int n, const double *a, const float *b) {
-    double sum = 0;
-    for (int i = 0; i < n; i++)
-        sum += a[i] * b[i];
-    return sum;
+    double part[CHUNK_MOST];
+    SILT_PARALLEL(n)
+    for (int c = 0; c < silt_chunks(n); c++) {
+        double sum = 0;
+        for (int i = silt_chunk_first(n, c); i < silt_chunk_first(n, c + 1); i++)
+            sum += a[i] * b[i];
+        part[c] = sum;
+    }
+    return silt_total(silt_chunks(n), part);
 }
 
 // scale to be taken out of a right side so that single precision can hold what follows
@@ -268,6 +342,7 @@ static silt_status iterate(silt_space *q, matrix apply, silt_coarse *coarse, con
             return silt_fail(err, SILT_FAILED, "the pressure system did not converge in %d iterations (%d nodes)",
                              CG_LIMIT, n);
         const float beta = k ? (float)(rz / before) : 0;
+        SILT_PARALLEL(n)
         for (int i = 0; i < n; i++)
             d[i] = z[i] + beta * d[i];
         double curvature;
@@ -275,6 +350,7 @@ static silt_status iterate(silt_space *q, matrix apply, silt_coarse *coarse, con
         if (!(curvature > 0))
             return silt_fail(err, SILT_FAILED, "the pressure operator is not positive definite (%d nodes)", n);
         const double alpha = rz / curvature;
+        SILT_PARALLEL(n)
         for (int i = 0; i < n; i++) {
             x[i] += scale * alpha * d[i];
             r[i] -= alpha * ad[i];

@@ -1,4 +1,5 @@
 // the water's cells: adjacency, boundary and measures; what is water is decided in remesh.c
+#include "parallel.h"
 #include "remesh.h"
 
 double silt_cell_area(const double *x, const int *cell) {
@@ -20,10 +21,15 @@ void silt_group_join(int *parent, const int *cell) {
 }
 
 double silt_mesh_volume(const silt_mesh *mesh, const double *x) {
-    double sum = 0;
-    for (int e = 0; e < mesh->n_cell; e++)
-        sum += silt_cell_volume(mesh, x, e);
-    return sum;
+    const int n = mesh->n_cell;
+    double part[CHUNK_MOST];
+    SILT_PARALLEL(n)
+    for (int c = 0; c < silt_chunks(n); c++) {
+        part[c] = 0;
+        for (int e = silt_chunk_first(n, c); e < silt_chunk_first(n, c + 1); e++)
+            part[c] += silt_cell_volume(mesh, x, e);
+    }
+    return silt_total(silt_chunks(n), part);
 }
 
 // nodes of the facet opposite each node of a cell; in 2-D water on its left, in 3-D counter-clockwise seen from outside
@@ -38,34 +44,36 @@ void silt_cell_facet(int dim, const int *cell, int a, int facet[3]) {
 
 void silt_cells_across(int dim, int n_node, int n_cell, const int (*cell)[4], int (*across)[4]) {
     // facets by their lowest node; of those only the other nodes have to be told apart
-    int *start = silt_alloc((size_t)n_node + 1, sizeof *start);
+    silt_bins bins = silt_bins_create(n_node, n_cell);
     uint64_t *key = silt_alloc((size_t)n_cell * (size_t)(dim + 1) + 1, sizeof *key);
     int *item = silt_alloc((size_t)n_cell * (size_t)(dim + 1) + 1, sizeof *item);
     for (int pass = 0; pass < 2; pass++) {
-        for (int e = 0; e < n_cell; e++) {
-            // the cell's lowest node is that of all facets but the one opposite it
-            uint32_t node[4];
-            silt_cell_sort(cell[e], node);
-            if (pass == 0) {
-                start[node[0] >> 2] += dim;
-                start[node[1] >> 2]++;
-                continue;
-            }
-            for (int a = 0; a <= dim; a++) {
-                const uint64_t lo = node[a < 2 ? 2 : 1] >> 2, hi = dim == 2 ? 0 : node[a < 3 ? 3 : 2] >> 2;
-                const int k = --start[node[a ? 0 : 1] >> 2];
-                key[k] = lo << 32 | hi;
-                item[k] = 4 * e + (int)(node[a] & 3);
+        SILT_PRAGMA(omp parallel for schedule(static) num_threads(bins.n_part))
+        for (int part = 0; part < bins.n_part; part++) {
+            int *at = bins.at + (size_t)part * (size_t)n_node;
+            for (int e = silt_bins_first(&bins, part), last = silt_bins_first(&bins, part + 1); e < last; e++) {
+                // the cell's lowest node is that of all facets but the one opposite it
+                uint32_t node[4];
+                silt_cell_sort(cell[e], node);
+                if (pass == 0) {
+                    at[node[0] >> 2] += dim;
+                    at[node[1] >> 2]++;
+                    continue;
+                }
+                for (int a = 0; a <= dim; a++) {
+                    const uint64_t lo = node[a < 2 ? 2 : 1] >> 2, hi = dim == 2 ? 0 : node[a < 3 ? 3 : 2] >> 2;
+                    const int k = at[node[a ? 0 : 1] >> 2]++;
+                    key[k] = lo << 32 | hi;
+                    item[k] = 4 * e + (int)(node[a] & 3);
+                }
+                across[e][0] = across[e][1] = across[e][2] = across[e][3] = -1;
             }
         }
-        int sum = 0;
-        for (int i = 0; pass == 0 && i <= n_node; i++) {
-            sum += i < n_node ? start[i] : 0;
-            start[i] = sum;
-        }
+        if (pass == 0)
+            silt_bins_place(&bins);
     }
-    for (int e = 0; e < n_cell; e++)
-        across[e][0] = across[e][1] = across[e][2] = across[e][3] = -1;
+    const int *start = bins.start;
+    SILT_PARALLEL(n_node)
     for (int i = 0; i < n_node; i++) {
         // facets still without a partner are kept together at the bucket's front
         int open = start[i];
@@ -86,7 +94,7 @@ void silt_cells_across(int dim, int n_node, int n_cell, const int (*cell)[4], in
             }
         }
     }
-    free(start);
+    silt_bins_clear(&bins);
     free(key);
     free(item);
 }
@@ -189,6 +197,78 @@ void silt_mesh_connect(silt_mesh *mesh, const silt_nodes *nodes) {
     silt_mesh_connect_known(mesh, nodes);
 }
 
+// cells of every node, rising
+static void connect_cells(silt_mesh *mesh, int n, int n_corner) {
+    silt_bins bins = silt_bins_create(n, mesh->n_cell);
+    for (int pass = 0; pass < 2; pass++) {
+        SILT_PRAGMA(omp parallel for schedule(static) num_threads(bins.n_part))
+        for (int part = 0; part < bins.n_part; part++) {
+            int *at = bins.at + (size_t)part * (size_t)n;
+            for (int e = silt_bins_first(&bins, part), last = silt_bins_first(&bins, part + 1); e < last; e++)
+                for (int a = 0; a < n_corner; a++) {
+                    const int k = at[mesh->cell[e][a]]++;
+                    if (pass)
+                        mesh->node_cell[k] = e;
+                }
+        }
+        if (pass == 0)
+            silt_bins_place(&bins);
+    }
+    memcpy(mesh->node_cell_start, bins.start, (size_t)(n + 1) * sizeof *bins.start);
+    silt_bins_clear(&bins);
+}
+
+// Neighbours of the nodes of a part, themselves included, rising. @param seen  per node, 1 + the last node that has it as neighbour
+// @param list  grows  @return how many
+static int connect_nodes(silt_mesh *mesh, int first, int last, int n_corner, int *seen, int **list, int *capacity) {
+    const int *start = mesh->node_cell_start;
+    int filled = 0;
+    for (int i = first; i < last; i++) {
+        SILT_RESERVE(*list, *capacity, filled + (n_corner - 1) * (start[i + 1] - start[i]) + 1);
+        int *own = *list + filled, count = 0;
+        mesh->neighbour_start[i] = filled;
+        own[count++] = i;
+        seen[i] = i + 1;
+        for (int k = start[i]; k < start[i + 1]; k++)
+            for (int a = 0; a < n_corner; a++) {
+                const int j = mesh->cell[mesh->node_cell[k]][a];
+                if (seen[j] != i + 1) {
+                    seen[j] = i + 1;
+                    own[count++] = j;
+                }
+            }
+        list_sort(own, count);
+        filled += count;
+        mesh->wet[i] = start[i + 1] > start[i];
+    }
+    return filled;
+}
+
+// the first part straight into the mesh, the others' after it
+static void connect_neighbours(silt_mesh *mesh, int n, int n_corner) {
+    const int n_part = silt_threads(n);
+    int *list[PARALLEL_MOST] = {mesh->neighbour}, capacity[PARALLEL_MOST] = {mesh->neighbour_capacity}, count[PARALLEL_MOST];
+    SILT_PARALLEL(n)
+    for (int part = 0; part < n_part; part++) {
+        int *seen = silt_alloc((size_t)n + 1, sizeof *seen);
+        count[part] = connect_nodes(mesh, (int)((int64_t)n * part / n_part), (int)((int64_t)n * (part + 1) / n_part), n_corner, seen,
+                                    &list[part], &capacity[part]);
+        free(seen);
+    }
+    mesh->neighbour = list[0];
+    mesh->neighbour_capacity = capacity[0];
+    int filled = count[0];
+    for (int part = 1; part < n_part; part++) {
+        SILT_RESERVE(mesh->neighbour, mesh->neighbour_capacity, filled + count[part]);
+        memcpy(mesh->neighbour + filled, list[part], (size_t)count[part] * sizeof **list);
+        for (int i = (int)((int64_t)n * part / n_part); i < (int)((int64_t)n * (part + 1) / n_part); i++)
+            mesh->neighbour_start[i] += filled;
+        filled += count[part];
+        free(list[part]);
+    }
+    mesh->neighbour_start[n] = filled;
+}
+
 void silt_mesh_connect_known(silt_mesh *mesh, const silt_nodes *nodes) {
     const int n = nodes->count, dim = silt_nodes_dim(nodes), n_corner = dim + 1;
     mesh->revision++;
@@ -198,52 +278,13 @@ void silt_mesh_connect_known(silt_mesh *mesh, const silt_nodes *nodes) {
     SILT_RESERVE(mesh->node_cell_start, mesh->start_capacity, n + 1);
     SILT_RESERVE(mesh->neighbour_start, mesh->neighbour_start_capacity, n + 1);
     SILT_RESERVE(mesh->node_cell, mesh->node_cell_capacity, n_corner * mesh->n_cell + 1);
-    memset(mesh->wet, 0, (size_t)n);
     memset(mesh->surface, 0, (size_t)n);
-
-    // cells of every node, rising
-    int *start = mesh->node_cell_start;
-    memset(start, 0, (size_t)(n + 1) * sizeof *start);
-    for (int e = 0; e < mesh->n_cell; e++)
-        for (int a = 0; a < n_corner; a++)
-            start[mesh->cell[e][a]]++;
-    int sum = 0;
-    for (int i = 0; i <= n; i++) {
-        const int count = i < n ? start[i] : 0;
-        sum += count;
-        start[i] = sum;
-    }
-    for (int e = mesh->n_cell - 1; e >= 0; e--)
-        for (int a = 0; a < n_corner; a++)
-            mesh->node_cell[--start[mesh->cell[e][a]]] = e;
-
-    // neighbours, the node itself included, rising
-    int filled = 0;
-    int *seen = silt_alloc((size_t)n + 1, sizeof *seen); // 1 + the last node that has it as neighbour
-    for (int i = 0; i < n; i++) {
-        SILT_RESERVE(mesh->neighbour, mesh->neighbour_capacity, filled + dim * (start[i + 1] - start[i]) + 1);
-        int *list = mesh->neighbour + filled, count = 0;
-        mesh->neighbour_start[i] = filled;
-        list[count++] = i;
-        seen[i] = i + 1;
-        for (int k = start[i]; k < start[i + 1]; k++)
-            for (int a = 0; a < n_corner; a++) {
-                const int j = mesh->cell[mesh->node_cell[k]][a];
-                if (seen[j] != i + 1) {
-                    seen[j] = i + 1;
-                    list[count++] = j;
-                }
-            }
-        list_sort(list, count);
-        filled += count;
-        mesh->wet[i] = start[i + 1] > start[i];
-    }
-    mesh->neighbour_start[n] = filled;
+    connect_cells(mesh, n, n_corner);
+    connect_neighbours(mesh, n, n_corner);
 
     // a facet that only one cell has is boundary; in the order of their first nodes, in 3-D the lowest, then of the
     // cells
-    int *place = seen;
-    memset(place, 0, (size_t)(n + 1) * sizeof *place);
+    int *place = silt_alloc((size_t)n + 1, sizeof *place);
     for (int pass = 0; pass < 2; pass++) {
         for (int e = 0; e < mesh->n_cell; e++)
             for (int a = 0; a < n_corner; a++) {
@@ -273,7 +314,8 @@ void silt_mesh_connect_known(silt_mesh *mesh, const silt_nodes *nodes) {
             SILT_RESERVE(mesh->facet_kind, mesh->facet_kind_capacity, mesh->n_facet + 1);
         }
     }
-    free(seen);
+    free(place);
+    SILT_PARALLEL(mesh->n_facet)
     for (int k = 0; k < mesh->n_facet; k++)
         mesh->facet_kind[k] = (uint8_t)silt_facet_kind_of(mesh, nodes, mesh->facet[k]);
     for (int k = 0; k < mesh->n_facet; k++)

@@ -87,6 +87,29 @@ void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map) {
     nodes->count = k;
 }
 
+static void arrange(void *data, size_t size, int n, const int *order, char *spare) {
+    for (int k = 0; k < n; k++)
+        memcpy(spare + size * (size_t)k, (const char *)data + size * (size_t)order[k], size);
+    memcpy(data, spare, size * (size_t)n);
+}
+
+void silt_nodes_arrange(silt_nodes *nodes, const int *order) {
+    const int n = nodes->count;
+    const size_t dim = (size_t)silt_nodes_dim(nodes);
+    char *spare = silt_alloc((size_t)n + 1, dim * sizeof(double));
+    arrange(nodes->x, dim * sizeof *nodes->x, n, order, spare);
+    arrange(nodes->v, dim * sizeof *nodes->v, n, order, spare);
+    arrange(nodes->p, sizeof *nodes->p, n, order, spare);
+    if (nodes->h)
+        arrange(nodes->h, sizeof *nodes->h, n, order, spare);
+    arrange(nodes->debt, sizeof *nodes->debt, n, order, spare);
+    arrange(nodes->id, sizeof *nodes->id, n, order, spare);
+    arrange(nodes->kind, sizeof *nodes->kind, n, order, spare);
+    arrange(nodes->owner, sizeof *nodes->owner, n, order, spare);
+    arrange(nodes->wall, sizeof *nodes->wall, n, order, spare);
+    free(spare);
+}
+
 int silt_outline_points(int n, const double *outline, double h, double **xy) {
     int count = 0, capacity = 0;
     double *out = NULL;

@@ -1,5 +1,6 @@
 // the cloud's density: crowded nodes leave, stretched places get nodes
 #include "delaunay.h"
+#include "parallel.h"
 #include "remesh.h"
 
 /* Lengths are held against h, the mean of the local sizes of both ends. Candidates are taken in the order of how far off they
@@ -62,6 +63,7 @@ void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nod
     SILT_RESERVE(memory->area, memory->area_capacity, mesh->n_cell + 1);
     memory->n_cell = mesh->n_cell;
     memory->n_taken = 0;
+    SILT_PARALLEL(mesh->n_cell)
     for (int e = 0; e < mesh->n_cell; e++) {
         memcpy(memory->cell[e], mesh->cell[e], sizeof memory->cell[e]);
         memory->area[e] = silt_cell_volume(mesh, nodes->x, e);

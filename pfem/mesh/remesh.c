@@ -1,6 +1,7 @@
 // decides what is water: Delaunay of the cloud, held against what was water a step ago; books the volume that this
 // makes or loses
 #include "delaunay.h"
+#include "parallel.h"
 #include "remesh.h"
 
 #define WEDGE_LONG 3.5 // times h: longest edge of a cell in a wedge on a wall
@@ -45,24 +46,25 @@ static void cell_key(const int cell[4], int key[4]) {
 }
 
 void silt_cell_set_create(silt_cell_set *set, int n_node, int n, const int (*cell)[4]) {
+    silt_bins bins = silt_bins_create(n_node, n);
     set->n_node = n_node;
-    set->start = silt_alloc((size_t)n_node + 1, sizeof *set->start);
     set->item = silt_alloc((size_t)n + 1, sizeof *set->item);
     for (int pass = 0; pass < 2; pass++) {
-        for (int e = n - 1; e >= 0; e--) {
-            int key[4];
-            cell_key(cell[e], key);
-            if (pass == 0)
-                set->start[key[0]]++;
-            else
-                set->item[--set->start[key[0]]] = (struct silt_cell_item){{key[1], key[2], key[3]}, e};
-        }
-        int sum = 0;
-        for (int i = 0; pass == 0 && i <= n_node; i++) {
-            sum += i < n_node ? set->start[i] : 0;
-            set->start[i] = sum;
-        }
+        SILT_PRAGMA(omp parallel for schedule(static) num_threads(bins.n_part))
+        for (int part = 0; part < bins.n_part; part++)
+            for (int e = silt_bins_first(&bins, part), last = silt_bins_first(&bins, part + 1); e < last; e++) {
+                int key[4];
+                cell_key(cell[e], key);
+                const int at = bins.at[(size_t)part * (size_t)n_node + (size_t)key[0]]++;
+                if (pass)
+                    set->item[at] = (struct silt_cell_item){{key[1], key[2], key[3]}, e};
+            }
+        if (pass == 0)
+            silt_bins_place(&bins);
     }
+    set->start = bins.start;
+    bins.start = NULL;
+    silt_bins_clear(&bins);
 }
 
 int silt_cell_set_find(const silt_cell_set *set, const int cell[4]) {
@@ -555,6 +557,61 @@ static bool wedge_cell(const silt_mesh *mesh, const silt_nodes *nodes, const int
     return on && longest < WEDGE_LONG * h;
 }
 
+/** what decides whether a cell of the cloud is water */
+typedef struct chooser {
+    const silt_mesh *mesh, *gone; // the old mesh; its cells that the new triangulation has not
+    const silt_nodes *nodes;
+    const silt_scene *scene;
+    const silt_barrier *barrier;
+    const silt_memory *memory;
+    const silt_locator *locator; // of those that are gone
+    const silt_cell_set *rim;    // the old surface, as cells without a fourth node
+} chooser;
+
+typedef enum { CELL_NO = 0, CELL_WATER, CELL_SLIVER } choice;
+
+// @param before  the old cell that it is, -1  @param quality, radius  out, of what is water
+static choice cell_choose(const chooser *c, const int *cell, int before, double *quality, double *radius) {
+    const silt_mesh *mesh = c->mesh;
+    const silt_nodes *nodes = c->nodes;
+    const silt_scene *scene = c->scene;
+    const int dim = mesh->dim;
+    bool inner = true;
+    for (int a = 0; a <= dim; a++)
+        inner &= c->memory->interior[cell[a]];
+    double corner[12], centre[3];
+    silt_cell_corners(mesh, nodes->x, cell, corner);
+    const silt_cell_shape shape = silt_cell_measure(dim, corner);
+    const double h = silt_cell_h(nodes, dim + 1, cell, scene->fluid.size);
+    const bool flat = dim == 3 && shape.height < CELL_FLAT * h;
+    if ((dim == 2 && shape.volume < 1e-9 * h * h) || silt_cell_on_wall(mesh, nodes, cell, &shape, h))
+        return CELL_NO;
+    const double bound = scene->fluid.alpha * h;
+    const bool round = shape.radius < bound;
+    const bool wedge = !round && wedge_cell(mesh, nodes, cell, corner, h) && !(before < 0 && cell_is_dent(mesh, cell, corner));
+    if (!(inner || flat || wedge || round || (dim == 3 && enclosing_radius(corner) < bound)))
+        return CELL_NO;
+    cell_centre(mesh, scene, corner, centre);
+    if (before < 0 && !inner && !flat) {
+        double weight[4];
+        int n_fluid = 0, n_inner = 0;
+        for (int a = 0; a <= dim; a++) {
+            n_fluid += nodes->kind[cell[a]] == NODE_FLUID || nodes->kind[cell[a]] == NODE_INLET || nodes->kind[cell[a]] == NODE_OPEN;
+            n_inner += c->memory->interior[cell[a]];
+        }
+        // in space a gap is between surfaces: a node from within has none to close
+        const bool closes = round && n_fluid > 0 && (dim == 2 || n_inner == 0);
+        if (silt_locate(c->locator, c->gone, nodes->x, centre, weight) < 0 &&
+            !(closes && cell_closes(mesh, nodes, c->rim, cell, corner, &shape, scene->fluid.merge * h)))
+            return CELL_NO;
+    }
+    if (cell_behind(mesh, nodes, c->barrier, cell, centre))
+        return CELL_NO;
+    *quality = shape.height / h;
+    *radius = shape.radius;
+    return flat ? CELL_SLIVER : CELL_WATER;
+}
+
 // Which cells of the cloud are water now. @return largest circumradius of these, m
 static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const silt_scene *scene,
                            const silt_barrier *barrier, const silt_memory *memory, const silt_cell_set *old,
@@ -565,8 +622,10 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
     double largest = 0;
 
     // old cells that the new triangulation has not: new cells in there are water too
-    uint8_t *stays = silt_alloc((size_t)memory->n_cell + 1, 1);
+    uint8_t *stays = silt_alloc((size_t)memory->n_cell + 1, 1), *chosen = silt_alloc((size_t)n_cells + 1, 1);
     int *before = silt_alloc((size_t)n_cells + 1, sizeof *before);
+    double *quality = silt_alloc((size_t)n_cells + 1, sizeof *quality);
+    SILT_PARALLEL(n_cells)
     for (int e = 0; e < n_cells; e++) {
         before[e] = silt_cell_set_find(old, cells[e]);
         if (before[e] >= 0)
@@ -581,7 +640,6 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
         }
     silt_locator locator = {0};
     silt_locator_build(&locator, &gone, nodes->x, scene->fluid.size);
-    // the old surface, as cells without a fourth node
     int(*facet)[4] = silt_alloc((size_t)mesh->n_facet + 1, sizeof *facet);
     for (int k = 0; dim == 3 && k < mesh->n_facet; k++) {
         memcpy(facet[k], mesh->facet[k], sizeof mesh->facet[k]);
@@ -590,55 +648,47 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
     silt_cell_set rim;
     silt_cell_set_create(&rim, mesh->n_node, dim == 3 ? mesh->n_facet : 0, (const int(*)[4])facet);
 
+    const chooser c = {mesh, &gone, nodes, scene, barrier, memory, &locator, &rim};
+    SILT_PRAGMA(omp parallel for schedule(static) num_threads(silt_threads(n_cells)) reduction(max:largest))
+    for (int e = 0; e < n_cells; e++) {
+        double radius;
+        chosen[e] = (uint8_t)cell_choose(&c, cells[e], before[e], &quality[e], &radius);
+        if (chosen[e] == CELL_WATER)
+            largest = silt_max(largest, radius);
+    }
     mesh->n_cell = 0;
     for (int e = 0; e < n_cells; e++) {
-        const int *cell = cells[e];
-        bool inner = true;
-        for (int a = 0; a <= dim; a++)
-            inner &= memory->interior[cell[a]];
-        double corner[12], centre[3];
-        silt_cell_corners(mesh, nodes->x, cell, corner);
-        const silt_cell_shape shape = silt_cell_measure(dim, corner);
-        const double h = silt_cell_h(nodes, dim + 1, cell, scene->fluid.size);
-        const bool flat = dim == 3 && shape.height < CELL_FLAT * h;
-        if ((dim == 2 && shape.volume < 1e-9 * h * h) || silt_cell_on_wall(mesh, nodes, cell, &shape, h))
-            continue;
-        const double bound = scene->fluid.alpha * h;
-        const bool round = shape.radius < bound;
-        const bool wedge = !round && wedge_cell(mesh, nodes, cell, corner, h) && !(before[e] < 0 && cell_is_dent(mesh, cell, corner));
-        bool keep = inner || flat || wedge || round || (dim == 3 && enclosing_radius(corner) < bound);
-        if (!keep)
-            continue;
-        cell_centre(mesh, scene, corner, centre);
-        if (before[e] < 0 && !inner && !flat) {
-            double weight[4];
-            int n_fluid = 0, n_inner = 0;
-            for (int a = 0; a <= dim; a++) {
-                n_fluid += nodes->kind[cell[a]] == NODE_FLUID || nodes->kind[cell[a]] == NODE_INLET || nodes->kind[cell[a]] == NODE_OPEN;
-                n_inner += memory->interior[cell[a]];
-            }
-            // in space a gap is between surfaces: a node from within has none to close
-            keep = silt_locate(&locator, &gone, nodes->x, centre, weight) >= 0 ||
-                   (round && n_fluid > 0 && (dim == 2 || n_inner == 0) &&
-                    cell_closes(mesh, nodes, &rim, cell, corner, &shape, scene->fluid.merge * h));
-        }
-        if (!keep || cell_behind(mesh, nodes, barrier, cell, centre))
+        if (chosen[e] == CELL_NO)
             continue;
         if (dim == 3) {
             SILT_RESERVE(*sliver, sliver_capacity, mesh->n_cell + 1);
-            (*sliver)[mesh->n_cell] = flat;
+            (*sliver)[mesh->n_cell] = chosen[e] == CELL_SLIVER;
         }
-        if (!flat)
-            largest = silt_max(largest, shape.radius);
-        draft_push(draft, cell, before[e], shape.height / h);
+        draft_push(draft, cells[e], before[e], quality[e]);
     }
     silt_mesh_clear(&gone);
     silt_locator_clear(&locator);
     silt_cell_set_clear(&rim);
     free(facet);
     free(stays);
+    free(chosen);
     free(before);
+    free(quality);
     return largest;
+}
+
+// New numbers where the present ones lie across each other; the mesh's cells still have those before map.
+static void nodes_arrange(const silt_mesh *mesh, silt_nodes *nodes, double h, int n_before, int *map) {
+    int *order = silt_alloc((size_t)nodes->count + 1, sizeof *order), *number = silt_alloc((size_t)nodes->count + 1, sizeof *number);
+    if (silt_nodes_order(mesh, map, nodes, h, order)) {
+        silt_nodes_arrange(nodes, order);
+        for (int k = 0; k < nodes->count; k++)
+            number[order[k]] = k;
+        for (int i = 0; i < n_before; i++)
+            map[i] = map[i] < 0 ? -1 : number[map[i]];
+    }
+    free(order);
+    free(number);
 }
 
 silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
@@ -691,7 +741,9 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
     free(sliver);
     draft_clear(&draft);
 
+    const int n_before = nodes->count;
     silt_nodes_compact(nodes, memory->dead, map);
+    nodes_arrange(mesh, nodes, scene->fluid.size, n_before, map);
     silt_delaunay_renumber(memory->kept, map, nodes->count);
     for (int e = 0; e < mesh->n_cell; e++)
         for (int a = 0; a <= dim; a++)

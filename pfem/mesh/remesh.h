@@ -25,6 +25,18 @@ static inline int silt_cell_sort(const int *cell, uint32_t rising[4]) {
     return turned ^ again ^ last;
 }
 
+/** Items by a number that each has (a node, mostly), for several threads: each counts the items of its part, then puts them where their
+ * turn is. The order within a number is that of the items. */
+typedef struct silt_bins {
+    int n_bin, n_item, n_part;
+    int *start; // owned, n_bin + 1: where each number's items begin
+    int *at;    // owned, n_bin a part: counts, then places
+} silt_bins;
+silt_bins silt_bins_create(int n_bin, int n_item);
+void silt_bins_place(silt_bins *bins); // between counting and putting
+void silt_bins_clear(silt_bins *bins);
+static inline int silt_bins_first(const silt_bins *bins, int part) { return (int)((int64_t)bins->n_item * part / bins->n_part); }
+
 /** a set of cells (or of facets, which have no fourth node) by their nodes, in whatever order these are */
 typedef struct silt_cell_set {
     int n_node;
@@ -43,6 +55,12 @@ void silt_cell_set_clear(silt_cell_set *set);
  * @param node    n_corner each; turned too
  * @param sorted  out, n; a triangle's fourth node is -1 */
 void silt_cells_sort(int n_node, int n_corner, int n, int *node, int (*sorted)[4]);
+
+/** The order in which nodes near in space are near in number too, where it pays: many nodes, whose numbers are mixed by now. It hangs on
+ * positions and numbers alone, so that a resumed run does the same.
+ * @param map    the nodes' numbers from those in the mesh's cells
+ * @param order  out, n: the node that is to be the k-th. @return whether it pays */
+bool silt_nodes_order(const silt_mesh *mesh, const int *map, const silt_nodes *nodes, double h, int *order);
 
 /** a cell's measures */
 typedef struct silt_cell_shape {

@@ -1,6 +1,7 @@
 // gauges: what the scene wants to know at a place in every step, one or three history columns each
 
 #include "output.h"
+#include "parallel.h"
 
 // a point this close to the water's boundary (times fluid.size) is read at the boundary: wall sensors stand on the wall
 #define GAUGE_REACH 0.05
@@ -208,14 +209,21 @@ static void gauge_turn(int dim, double mass, const double *x, const double *v, c
 void silt_water_moment(const silt_nodes *nodes, const silt_mesh *mesh, const double *solid, double density,
                        const double about[3], double moment[3]) {
     const int dim = silt_nodes_dim(nodes);
+    const int n = mesh->n_cell;
+    double part[CHUNK_MOST][3] = {{0}};
     moment[0] = moment[1] = moment[2] = 0;
-    for (int e = 0; e < mesh->n_cell; e++) {
-        double corner[12];
-        const double share = density * gauge_water_volume(nodes, mesh, solid, e) / (dim + 1);
-        silt_cell_corners(mesh, nodes->x, mesh->cell[e], corner);
-        for (int a = 0; a <= dim; a++)
-            gauge_turn(dim, share, corner + dim * a, nodes->v + dim * mesh->cell[e][a], about, moment);
-    }
+    SILT_PARALLEL(n)
+    for (int c = 0; c < silt_chunks(n); c++)
+        for (int e = silt_chunk_first(n, c); e < silt_chunk_first(n, c + 1); e++) {
+            double corner[12];
+            const double share = density * gauge_water_volume(nodes, mesh, solid, e) / (dim + 1);
+            silt_cell_corners(mesh, nodes->x, mesh->cell[e], corner);
+            for (int a = 0; a <= dim; a++)
+                gauge_turn(dim, share, corner + dim * a, nodes->v + dim * mesh->cell[e][a], about, part[c]);
+        }
+    for (int c = 0; c < silt_chunks(n); c++)
+        for (int d = 0; d < 3; d++)
+            moment[d] += part[c][d];
     for (int i = 0; i < nodes->count && nodes->debt; i++)
         if (!mesh->wet[i])
             gauge_turn(dim, density * nodes->debt[i], nodes->x + dim * i, nodes->v + dim * i, about, moment);

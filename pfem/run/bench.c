@@ -9,6 +9,7 @@
 
 #include "bench.h"
 #include "delaunay.h"
+#include "parallel.h"
 
 #define BENCH_STEPS 9
 #define BENCH_WARM_UP 6
@@ -112,16 +113,26 @@ static double mean(int n, const sample *s, size_t offset) {
 }
 #define MEAN(n, s, field) mean(n, s, offsetof(sample, field))
 
+// With more than one thread every other step is done on one, so that what disturbs the machine disturbs both: the bits are the same.
+static silt_status pair_measure(silt_run *run, const bench_row *row, int k, sample *one, sample *all, silt_error *err) {
+    for (int turn = 0; turn < 2; turn++) {
+        const bool alone = turn == k % 2;
+        silt_threads_ask(alone ? 1 : row->threads);
+        SILT_TRY(step_measure(run, alone ? one : all, err));
+    }
+    return SILT_OK;
+}
+
 // the steps one by one: medians, since what disturbs one step lasts for a few only
 static silt_status measure_steps(silt_run *run, bench_row *row, silt_error *err) {
     const int n = row->steps;
-    sample *s = silt_alloc((size_t)n + 1, sizeof *s);
+    sample *s = silt_alloc((size_t)n + 1, sizeof *s), *one = silt_alloc((size_t)n + 1, sizeof *one);
     double *ratio = silt_alloc((size_t)n + 1, sizeof *ratio);
     silt_status status = SILT_OK;
     for (int k = 0; k < row->warm_up && status == SILT_OK; k++)
         status = step_measure(run, s, err);
     for (int k = 0; k < n && status == SILT_OK; k++) {
-        status = step_measure(run, &s[k], err);
+        status = row->threads > 1 ? pair_measure(run, row, k, &one[k], &s[k], err) : step_measure(run, &s[k], err);
         // the unit after each step, so that what slows one slows both
         row->bytes = silt_max(row->bytes, memory_line("VmHWM"));
         s[k].unit = silt_delaunay_seconds(row->dimension, run->nodes.count, run->nodes.x);
@@ -148,6 +159,12 @@ static silt_status measure_steps(silt_run *run, bench_row *row, silt_error *err)
         row->worst_in_unit = silt_max(row->worst_in_unit, ratio[k]);
     }
     row->in_unit = median(n, ratio, 1);
+    for (int c = 0; c < CLOCK_COUNT && row->threads > 1; c++)
+        row->phase_one[c] = median(n, &one->phase[c], SAMPLE_LENGTH) / row->nodes;
+    for (int k = 0; k < n; k++)
+        ratio[k] = row->threads > 1 ? one[k].total / s[k].total : 1;
+    row->faster = median(n, ratio, 1);
+    free(one);
     free(s);
     free(ratio);
     return status;

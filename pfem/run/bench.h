@@ -11,7 +11,7 @@ typedef struct silt_bench_def {
     const char *scenes; // names or scene files, commas between; NULL: water alone in 2-D and 3-D
     const char *sizes;  // nodes (or N, for a collapse), commas between, k for thousands; NULL: what the scene has
     int steps, warm_up; // that are measured, and before; 0: 9 and 6
-    int threads;        // 0: one
+    int threads;        // 0: one; more: every other step is done on one, to compare
     int n_set;
     const char *const *set; // -D
     const char *json;   // file, NULL: none
@@ -47,6 +47,8 @@ typedef struct bench_row {
     bool cpu;                     // times are the processor's, else the wall's
     double nodes, cells, grains;  // means over the steps
     double phase[CLOCK_COUNT];    // s per node and step
+    double phase_one[CLOCK_COUNT]; // s per node and step, on one thread, where more are measured
+    double faster;                // steps on one thread over those on all, pair by pair
     double step, mean;            // s per node and step: sum of the phases, and the mean over the steps
     double unit;                  // U1: s per point
     double in_unit;               // steps in units; pair by pair where steps were measured

@@ -36,6 +36,8 @@ void bench_table(FILE *to, const bench_row *row, int n) {
     const bench_scene *kind = bench_scene_find(row->name);
     fprintf(to, "%s: %s; %d thread%s", row->name, kind ? kind->document : "a scene's file", row->threads, row->threads > 1 ? "s" : "");
     fprintf(to, ", %s time", row->cpu ? "CPU" : "wall");
+    if (row->threads > 1 && !row->whole)
+        fprintf(to, ", every other step on one (x: how much longer that takes)");
     if (!row->whole)
         fprintf(to, ", medians of %d steps after %d", row->steps, row->warm_up);
     fputc('\n', to);
@@ -52,14 +54,19 @@ void bench_table(FILE *to, const bench_row *row, int n) {
         if (!any)
             continue;
         fprintf(to, "  %-14s %-8s", phase_name[c], "ns");
-        for (int k = 0; k < n; k++)
+        for (int k = 0; k < n; k++) {
             fprintf(to, "  %10.0f %3.0f %%", 1e9 * row[k].phase[c], 100 * row[k].phase[c] / row[k].step);
+            if (row->threads > 1 && !row->whole)
+                fprintf(to, " x%4.2f", row[k].phase_one[c] / row[k].phase[c]);
+        }
         growth_print(to, row, n, row[0].phase[c], row[n - 1].phase[c]);
     }
     fprintf(to, "  %-14s %-8s", "step", "ns");
     for (int k = 0; k < n; k++)
         fprintf(to, "  %10.0f      ", 1e9 * row[k].step);
     growth_print(to, row, n, row[0].step, row[n - 1].step);
+    if (row->threads > 1 && !row->whole)
+        LINE("one thread", "over all", "%10.2f", r->faster);
     LINE("U1", "ns", "%10.0f", 1e9 * r->unit);
     fprintf(to, "  %-14s %-8s", "step", "U1");
     for (int k = 0; k < n; k++)
@@ -104,7 +111,7 @@ static void row_json(FILE *to, const bench_row *r, const bench_row *before) {
         {"growth_in_u1", before ? growth(before, r, before->in_unit, r->in_unit) : NAN},
         {"iterations", r->iterations}, {"momentum_iterations", r->momentum_iterations}, {"pressure_iterations", r->pressure_iterations},
         {"retries", r->retries}, {"dt", r->dt}, {"courant", r->courant}, {"start_seconds", r->start}, {"peak_bytes_per_node", r->bytes},
-        {"substeps", r->substeps},
+        {"substeps", r->substeps}, {"one_thread_over_all", r->faster},
         // of a whole run only
         {"seconds", r->whole ? r->seconds : NAN}, {"model_seconds", r->whole ? r->time : NAN}, {"u2_seconds", r->whole ? r->unit_2 : NAN},
         {"run_per_model_in_u2", r->whole ? r->seconds / r->time / r->unit_2 : NAN},

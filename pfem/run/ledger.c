@@ -1,5 +1,57 @@
 // the ledger: what there is of water and sediment, where it went, what moves it
+#include "parallel.h"
 #include "run.h"
+
+/** what cells hold */
+typedef struct tally {
+    double mesh_volume, water, momentum[3], kinetic, potential;
+} tally;
+
+static tally cells_tally(const silt_run *run, int first, int last) {
+    const silt_nodes *nodes = &run->nodes;
+    const int D = silt_nodes_dim(nodes);
+    const double rho = run->scene->fluid.density;
+    tally t = {0};
+    for (int e = first; e < last; e++) {
+        const int *cell = run->mesh.cell[e];
+        const double volume = silt_cell_volume(&run->mesh, nodes->x, e);
+        double water = volume, corner[12], height = 0;
+        silt_cell_corners(&run->mesh, nodes->x, cell, corner);
+        t.mesh_volume += volume;
+        for (int a = 0; a <= D; a++) {
+            if (run->drag)
+                water -= volume * run->drag->solid[cell[a]] / (D + 1);
+            for (int d = 0; d < D; d++)
+                height += corner[D * a + d] * run->scene->gravity[d] / (D + 1);
+        }
+        t.water += water;
+        for (int a = 0; a <= D; a++)
+            for (int d = 0; d < D; d++) {
+                const double m = rho * water / (D + 1), v = nodes->v[D * cell[a] + d];
+                t.momentum[d] += m * v;
+                t.kinetic += 0.5 * m * v * v;
+            }
+        t.potential -= rho * water * height;
+    }
+    return t;
+}
+
+static void ledger_cells(silt_run *run) {
+    silt_ledger *ledger = &run->ledger;
+    const int n = run->mesh.n_cell;
+    tally part[CHUNK_MOST];
+    SILT_PARALLEL(n)
+    for (int c = 0; c < silt_chunks(n); c++)
+        part[c] = cells_tally(run, silt_chunk_first(n, c), silt_chunk_first(n, c + 1));
+    for (int c = 0; c < silt_chunks(n); c++) {
+        ledger->mesh_volume += part[c].mesh_volume;
+        ledger->fluid_volume += part[c].water;
+        for (int d = 0; d < 3; d++)
+            ledger->momentum[d] += part[c].momentum[d];
+        ledger->kinetic_energy += part[c].kinetic;
+        ledger->potential_energy += part[c].potential;
+    }
+}
 
 void silt_run_ledger(silt_run *run) {
     silt_ledger *ledger = &run->ledger;
@@ -10,27 +62,7 @@ void silt_run_ledger(silt_run *run) {
     memset(ledger->momentum, 0, sizeof ledger->momentum);
     ledger->mesh_volume = ledger->flying_volume = ledger->fluid_volume = 0;
     const int D = silt_nodes_dim(nodes);
-    for (int e = 0; e < run->mesh.n_cell; e++) {
-        const int *cell = run->mesh.cell[e];
-        const double volume = silt_cell_volume(&run->mesh, nodes->x, e);
-        double water = volume, corner[12], height = 0;
-        silt_cell_corners(&run->mesh, nodes->x, cell, corner);
-        ledger->mesh_volume += volume;
-        for (int a = 0; a <= D; a++) {
-            if (run->drag)
-                water -= volume * run->drag->solid[cell[a]] / (D + 1);
-            for (int d = 0; d < D; d++)
-                height += corner[D * a + d] * scene->gravity[d] / (D + 1);
-        }
-        ledger->fluid_volume += water;
-        for (int a = 0; a <= D; a++)
-            for (int d = 0; d < D; d++) {
-                const double m = rho * water / (D + 1), v = nodes->v[D * cell[a] + d];
-                ledger->momentum[d] += m * v;
-                ledger->kinetic_energy += 0.5 * m * v * v;
-            }
-        ledger->potential_energy -= rho * water * height;
-    }
+    ledger_cells(run);
     for (int i = 0; i < nodes->count; i++) {
         if (run->mesh.wet[i])
             continue;

@@ -1,8 +1,8 @@
 // the time loop, and what stands before and after it
-#include <omp.h>
 #include <signal.h>
 #include <unistd.h>
 
+#include "parallel.h"
 #include "run.h"
 
 #define PRESSURE_SLOPE 0.2 // largest share by which output carries the pressure on to the end of the step
@@ -417,8 +417,7 @@ static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_
     run->started = silt_seconds();
     silt_clock_reset();
     run->summary.status = "running";
-    if (def->threads > 0)
-        omp_set_num_threads(def->threads);
+    silt_threads_ask(def->threads);
     run->nodes.dim = run->mesh.dim = scene->dimension;
     run->mesh.period[0] = scene->period[1] - scene->period[0];
     run->gauge = silt_alloc((size_t)silt_gauges_count(scene) + 1, sizeof *run->gauge);
