@@ -364,6 +364,7 @@ static bool coupling_find(silt_coupling *c, const silt_nodes *nodes, const silt_
         to->mass = g->mass;
         to->diameter = g->diameter;
         to->number = g->number;
+        to->force[0] = to->force[1] = 0.0;
         to->cell = coupling_locate(c, g, nodes, mesh, &located, to->weight);
         c->wet = c->wet || to->cell >= 0;
     }

@@ -76,14 +76,7 @@ static void exchange_smooth(silt_exchange *e, const double (*water)[3]) {
 
 // what does not change within a step, of grains in the water in groups of eight
 static void exchange_pack(silt_exchange *e, double dt) {
-    SILT_RESERVE(e->wet, e->wet_capacity, e->n_grain + DRAG_GROUP);
-    SILT_RESERVE(e->group, e->group_capacity, e->n_grain / DRAG_GROUP + 1);
-    e->n_wet = 0;
-    for (int p = 0; p < e->n_grain; p++) {
-        e->grain[p].force[0] = e->grain[p].force[1] = 0.0;
-        if (e->grain[p].cell >= 0)
-            e->wet[e->n_wet++] = p;
-    }
+    SILT_RESERVE(e->group, e->group_capacity, e->n_wet / DRAG_GROUP + 1);
     e->n_group = (e->n_wet + DRAG_GROUP - 1) / DRAG_GROUP;
     for (int m = 0; m < e->n_group; m++) {
         exchange_group *to = &e->group[m];
@@ -262,38 +255,42 @@ static void exchange_update(void *self, const double *velocity, const double *pr
 
 // ---------------------------------------------------------------- the step
 
-// Nodes within reach of a grain: what stands farther off hears e^-12 of it. Nothing of the exchange is done for the others (ten
+// Grains in the water, and nodes within reach of their cells: what stands farther off hears e^-12 of a grain. Nothing of the exchange is done for the others (ten
 // thousand grains in a third of a tank: half of the nodes, and a third of the time for the factor). The kernel closes
 // whatever the choice is.
 static void exchange_choose(silt_exchange *e) {
     const silt_mesh *mesh = e->mesh;
     const double reach = kernel_reach * e->width, most = 4.0 * mesh->n_node + 64;
-    double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL}, size = reach / 4.0;
+    double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL}, size = reach / 8.0;
     memset(e->chosen, 0, (size_t)mesh->n_node);
+    SILT_RESERVE(e->wet, e->wet_capacity, e->n_grain);
+    e->n_wet = 0;
     for (int p = 0; p < e->n_grain; p++) {
-        const silt_exchange_grain *g = &e->grain[p];
-        for (int k = 0; k < 2 && g->cell >= 0; k++) {
-            lo[k] = silt_min(lo[k], g->x[k] - reach);
-            hi[k] = silt_max(hi[k], g->x[k] + reach);
-        }
-        for (int a = 0; a < 3 && g->cell >= 0; a++)
-            e->chosen[mesh->cell[g->cell][a]] = 1;
+        const int c = e->grain[p].cell;
+        if (c < 0)
+            continue;
+        e->wet[e->n_wet++] = p;
+        for (int a = 0; a < 3; a++)
+            e->chosen[mesh->cell[c][a]] = 1;
     }
-    if (!(lo[0] <= hi[0]))
+    for (int i = 0; i < mesh->n_node; i++)
+        for (int k = 0; k < 2 && e->chosen[i]; k++) {
+            lo[k] = silt_min(lo[k], e->x[2 * i + k] - reach);
+            hi[k] = silt_max(hi[k], e->x[2 * i + k] + reach);
+        }
+    if (e->n_wet == 0)
         return;
     while ((hi[0] - lo[0]) / size * ((hi[1] - lo[1]) / size) > most)
         size *= 1.5;
 
-    // a grid over the grains: those near it are counted in squares of bins by sums along rows, then columns
+    // a grid over their nodes: those near it are counted in squares of bins by sums along rows, then columns
     const int wide = (int)ceil(reach / size), n[2] = {(int)((hi[0] - lo[0]) / size) + 1, (int)((hi[1] - lo[1]) / size) + 1};
     SILT_RESERVE(e->bin, e->bin_capacity, 2 * n[0] * n[1]);
     int *count = e->bin, *rows = e->bin + n[0] * n[1];
     memset(count, 0, (size_t)(n[0] * n[1]) * sizeof *count);
-    for (int p = 0; p < e->n_grain; p++) {
-        const silt_exchange_grain *g = &e->grain[p];
-        if (g->cell >= 0)
-            count[(int)((g->x[1] - lo[1]) / size) * n[0] + (int)((g->x[0] - lo[0]) / size)] = 1;
-    }
+    for (int i = 0; i < mesh->n_node; i++)
+        if (e->chosen[i])
+            count[(int)((e->x[2 * i + 1] - lo[1]) / size) * n[0] + (int)((e->x[2 * i] - lo[0]) / size)] = 1;
     for (int j = 0; j < n[1]; j++)
         for (int i = 0, sum = 0; i < n[0] + wide; i++) {
             sum += i < n[0] ? count[j * n[0] + i] : 0;
@@ -377,9 +374,9 @@ silt_status silt_exchange_place(silt_exchange *e, const silt_nodes *nodes, const
 
     // solid fraction
     memset(e->solid, 0, (size_t)n * sizeof *e->solid);
-    for (int p = 0; p < e->n_grain; p++) {
-        const silt_exchange_grain *g = &e->grain[p];
-        for (int a = 0; a < 3 && g->cell >= 0; a++)
+    for (int p = 0; p < e->n_wet; p++) {
+        const silt_exchange_grain *g = &e->grain[e->wet[p]];
+        for (int a = 0; a < 3; a++)
             e->solid[mesh->cell[g->cell][a]] += g->weight[a] * g->solid;
     }
     silt_kernel_smooth(&e->kernel, e->solid);

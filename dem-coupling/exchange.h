@@ -28,7 +28,7 @@ typedef struct silt_exchange_grain {
     double effective;   // kg/(s m), beta_eff
     double free[2];     // m/s, v_free of the last update
     double pressure[2]; // N/m, force of the pressure gradient
-    double force[2];    // N/m, all of the water's force
+    double force[2];    // N/m, all of the water's force; out of the water as it was before
 } silt_exchange_grain;
 
 /** what passed between grains and water in a step, N per m of width */

@@ -149,7 +149,7 @@ static void nested_rows(silt_nested *f, const silt_mesh *mesh) {
         count = b->row_end - b->row_begin;
         b->value = value;
         const size_t own = (size_t)(b->end - b->begin);
-        value += own * (own + (size_t)(filled - b->row_begin));
+        value += own * (own + 1) / 2 + own * (size_t)(filled - b->row_begin);
         panel = own * (own + (size_t)count) > panel ? own * (own + (size_t)count) : panel;
         n_waiting -= b->n_child;
         f->waiting[n_waiting++] = e;
@@ -261,8 +261,7 @@ VECTOR_CLONES static void nested_update(int own, int wide, const double *panel, 
 VECTOR_CLONES static void nested_store(int own, int wide, const double *panel, double *out) {
     for (int c = 0; c < own; c++)
         for (int r = c; r < own; r++)
-            out[r + own * c] = panel[r + (size_t)wide * (size_t)c];
-    out += own * own;
+            *out++ = panel[r + (size_t)wide * (size_t)c];
     for (int r = own; r < wide; r += STRIP)
         for (int c = 0; c < own; c++, out += STRIP)
             for (int k = 0; k < STRIP; k++)
@@ -271,13 +270,14 @@ VECTOR_CLONES static void nested_store(int own, int wide, const double *panel, d
 
 // x (own rows, then those named) forward through a panel, m times four fields a row
 VECTOR_INLINE void nested_forward(const int m, int own, int rest, const double *panel, const int *row, four *x, four *all) {
-    for (int c = 0; c < own; c++, panel += own) {
+    for (int c = 0; c < own; c++) {
         four now[2];
         for (int k = 0; k < m; k++)
-            x[m * c + k] = now[k] = x[m * c + k] * panel[c];
-        for (int r = c + 1; r < own; r++)
+            x[m * c + k] = now[k] = x[m * c + k] * *panel;
+        panel++;
+        for (int r = c + 1; r < own; r++, panel++)
             for (int k = 0; k < m; k++)
-                x[m * r + k] -= now[k] * panel[r];
+                x[m * r + k] -= now[k] * *panel;
     }
     for (int r = 0; r < rest; r += STRIP) {
         four sum[STRIP][2];
@@ -296,7 +296,7 @@ VECTOR_INLINE void nested_forward(const int m, int own, int rest, const double *
 }
 
 VECTOR_INLINE void nested_backward(const int m, int own, int rest, const double *panel, const int *row, four *x, const four *all) {
-    const double *l = panel + own * own;
+    const double *l = panel += own * (own + 1) / 2;
     for (int r = 0; r < rest; r += STRIP) {
         four below[STRIP][2];
         for (int i = 0; i < STRIP; i++)
@@ -312,15 +312,15 @@ VECTOR_INLINE void nested_backward(const int m, int own, int rest, const double 
             }
     }
     for (int c = own - 1; c >= 0; c--) {
-        l = panel + own * c;
+        panel -= own - c;
         four sum[2];
         for (int k = 0; k < m; k++)
             sum[k] = x[m * c + k];
         for (int r = c + 1; r < own; r++)
             for (int k = 0; k < m; k++)
-                sum[k] -= x[m * r + k] * l[r];
+                sum[k] -= x[m * r + k] * panel[r - c];
         for (int k = 0; k < m; k++)
-            x[m * c + k] = sum[k] * l[c];
+            x[m * c + k] = sum[k] * *panel;
     }
 }
 

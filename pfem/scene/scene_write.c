@@ -23,6 +23,22 @@ static bool write_present(const silt_key *key, const void *base) {
     return true;
 }
 
+// true when fifteen digits read back to x: it is the nearest double to whole numbers m/10^k, whose quotient is rounded once where
+// both are exact. (By printing and reading back a list of 100k grains takes 0.2 s more.)
+static bool fifteen_digits(double x) {
+    const int k = x == 0 ? -1 : 14 - (int)floor(log10(fabs(x)));
+    if (k >= 0 && k <= 22) {
+        double power = 1;
+        for (int n = 0; n < k; n++)
+            power *= 10;
+        const double m = nearbyint(x * power);
+        return fabs(m) <= 1e15 && m / power == x;
+    }
+    char text[32];
+    snprintf(text, sizeof text, "%.15g", x);
+    return strtod(text, NULL) == x;
+}
+
 static void write_number(FILE *to, double x) {
     if (isinf(x)) {
         fprintf(to, x > 0 ? ".inf" : "-.inf");
@@ -34,12 +50,12 @@ static void write_number(FILE *to, double x) {
     }
     // the fewest digits that read back to the same bits
     char text[32];
-    for (int digits = 15; digits <= 17; digits++) {
+    for (int digits = fifteen_digits(x) ? 15 : 16; digits <= 17; digits++) {
         snprintf(text, sizeof text, "%.*g", digits, x);
-        if (strtod(text, NULL) == x)
+        if (digits != 16 || strtod(text, NULL) == x)
             break;
     }
-    fprintf(to, "%s", text);
+    fputs(text, to);
 }
 
 // numbers of one point or pair in brackets
