@@ -93,7 +93,6 @@ typedef struct silt_exchange {
     double (*seen)[3];       // owned, of those, velocity and pressure of the last iterate
     double (*spare)[3];      // owned, room for another
     double *volume, *flow;   // owned, of those, m2 and m2/s
-    bool steady;             // the last update changed little: it stands for the rest of the step
     int node_capacity[9], look_capacity[7], cell_capacity, bin_capacity, wet_capacity, group_capacity;
 } silt_exchange;
 
