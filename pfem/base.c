@@ -3,7 +3,14 @@
  */
 #include "base.h"
 
+#include <malloc.h>
+#include <stdint.h>
+#include <sys/mman.h>
 #include <time.h>
+
+#define LARGE ((size_t)1 << 18) // bytes of an array from which it is to lie on pages of 2 MB
+#define APART ((size_t)1 << 17) // bytes from which an array that lasts is kept out of the heap
+#define HEAP_MOST (32 << 20)    // bytes up to which what is needed for a moment comes from the heap: new pages cost 0.4 ns a byte
 
 silt_status silt_fail(silt_error *err, silt_status status, const char *format, ...) {
     if (!err)
@@ -26,10 +33,48 @@ static void memory_exhausted(size_t n, size_t size) {
     abort();
 }
 
+// Large pages: a step looks fewer addresses up, by 5 % of its time at 40k nodes and 7 % at 160k. From the page that the array begins
+// on, so that arrays beside each other share them. A wish, no more.
+static void large_pages(void *data, size_t bytes) {
+    const uintptr_t page = 4096, begin = (uintptr_t)data / page * page, end = ((uintptr_t)data + bytes) / page * page;
+    if (bytes >= LARGE)
+        madvise((void *)begin, end - begin, MADV_HUGEPAGE);
+}
+
+static bool memory_settled;
+
+void silt_memory_settle(void) {
+    memory_settled = mallopt(M_MMAP_THRESHOLD, HEAP_MOST) && mallopt(M_TRIM_THRESHOLD, INT32_MAX);
+}
+
+// From the system itself: there is no hole in the heap where it was, and pages that nobody has written to take no memory.
+static void *apart(size_t bytes) {
+    if (memory_settled && bytes >= APART)
+        mallopt(M_MMAP_THRESHOLD, APART);
+    void *data = calloc(1, bytes ? bytes : 1);
+    if (memory_settled && bytes >= APART)
+        mallopt(M_MMAP_THRESHOLD, HEAP_MOST);
+    if (data)
+        large_pages(data, bytes);
+    return data;
+}
+
 void *silt_alloc(size_t n, size_t size) {
     void *data = calloc(n ? n : 1, size ? size : 1);
     if (!data)
         memory_exhausted(n, size);
+    large_pages(data, n * size);
+    return data;
+}
+
+void *silt_room(void *data, size_t *capacity, size_t need, size_t size) {
+    if (need <= *capacity)
+        return data;
+    free(data);
+    *capacity = need + need / 8;
+    data = apart(*capacity * size);
+    if (!data)
+        memory_exhausted(*capacity, size);
     return data;
 }
 
@@ -43,13 +88,19 @@ void *silt_grow(void *data, int *capacity, int need, size_t size) {
     if (wanted > INT32_MAX)
         wanted = INT32_MAX;
     size_t bytes = 0;
+    const size_t old = (size_t)*capacity * size;
     void *grown = NULL;
     if (!__builtin_mul_overflow((size_t)wanted, size, &bytes))
-        grown = realloc(data, bytes ? bytes : 1);
+        grown = bytes >= APART ? apart(bytes) : realloc(data, bytes ? bytes : 1);
     if (!grown)
         memory_exhausted((size_t)wanted, size);
-    size_t old = (size_t)*capacity * size;
-    memset((char *)grown + old, 0, bytes - old);
+    if (bytes < APART)
+        memset((char *)grown + old, 0, bytes - old);
+    else {
+        if (old)
+            memcpy(grown, data, old);
+        free(data);
+    }
     *capacity = (int)wanted;
     return grown;
 }

@@ -3,13 +3,13 @@
 # say in the commit why the result changed.
 # usage: regression_store.sh SILT SCENE STORED.csv [HORIZON]
 # e.g.:  tests/regression_store.sh build/silt tests/scenes/hill.yaml tests/scenes/hill.csv
-# HORIZON in s, 0.22 by default. Is it short enough? Build once more with -DSILT_NATIVE=ON, whose rounding is another, and run
+# HORIZON in s, 0.2 by default. Is it short enough? Build once more with -DSILT_NATIVE=ON, whose rounding is another, and run
 # regression.sh with that silt: the largest difference must stay far below the tolerance.
 test_name=regression_store
 [ $# -ge 3 ] || { sed -n '4,5s/^# //p' "$0" >&2; exit 2; }
 # shellcheck source=tests/system.sh
 . "$(dirname "$0")/system.sh"
-horizon=${4:-0.22}
+horizon=${4:-0.2}
 
 expect 0 "$1" run "$2" -q -o "$work/out" --until "$horizon"
 # rows at the frames' times

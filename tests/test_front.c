@@ -8,11 +8,13 @@
 #include "front.h"
 
 #define MOST_BESIDE 128
+#define ROUNDED 1.2e-7 // single precision
 
 /** a graph of nodes with places and the numbers of a matrix */
 typedef struct graph {
     int n, *start, *list;
-    double *x, *row, *weight, *diagonal;
+    double *x, *diagonal;
+    float *row, *weight, *whole;
     silt_front_matrix matrix;
     uint64_t state;
 } graph;
@@ -25,6 +27,7 @@ static void graph_open(graph *g, int n) {
     g->row = silt_alloc(3 * (size_t)n * MOST_BESIDE, sizeof *g->row);
     g->weight = silt_alloc((size_t)n, sizeof *g->weight);
     g->diagonal = silt_alloc((size_t)n, sizeof *g->diagonal);
+    g->whole = silt_alloc((size_t)n, sizeof *g->whole);
 }
 
 // neighbours by a rule, rows at random; couplings are small beside the diagonal
@@ -34,17 +37,23 @@ static void graph_join(graph *g, bool (*joined)(const graph *, int, int)) {
         g->start[i] = filled;
         for (int j = 0; j < g->n; j++)
             if (i == j || joined(g, i, j)) {
-                double *entry = g->row + 3 * filled;
-                entry[0] = silt_uniform(&g->state) - 0.5;
-                entry[1] = silt_uniform(&g->state) - 0.5;
-                entry[2] = j > i ? 0.1 * silt_uniform(&g->state) : 0;
+                float *entry = g->row + 3 * filled;
+                entry[0] = (float)silt_uniform(&g->state) - 0.5f;
+                entry[1] = (float)silt_uniform(&g->state) - 0.5f;
+                entry[2] = j > i ? 0.1f * (float)silt_uniform(&g->state) : 0;
                 g->list[filled++] = j;
             }
-        g->weight[i] = i % 50 ? 0.5 + silt_uniform(&g->state) : -0.01; // a weight may be negative where the others make up for it
+        g->weight[i] = i % 50 ? 0.5f + (float)silt_uniform(&g->state) : -0.01f; // a weight may be negative where the others make up for it
         g->diagonal[i] = 1 + 0.1 * (filled - g->start[i]);
     }
     g->start[g->n] = filled;
-    g->matrix = (silt_front_matrix){.n = g->n, .neighbour_start = g->start, .neighbour = g->list, .row = g->row, .weight = g->weight, .diagonal = g->diagonal};
+    for (int i = 0; i < g->n; i++)
+        g->whole[i] += (float)g->diagonal[i];
+    for (int i = 0; i < g->n; i++)
+        for (int k = g->start[i]; k < g->start[i + 1]; k++)
+            g->whole[g->list[k]] += g->weight[i] * (silt_square(g->row[3 * k]) + silt_square(g->row[3 * k + 1]));
+    g->matrix = (silt_front_matrix){.n = g->n, .neighbour_start = g->start, .neighbour = g->list, .row = g->row, .weight = g->weight, .diagonal = g->diagonal,
+                                    .whole = g->whole};
 }
 
 static void graph_close(graph *g) {
@@ -54,6 +63,7 @@ static void graph_close(graph *g) {
     free(g->row);
     free(g->weight);
     free(g->diagonal);
+    free(g->whole);
 }
 
 static void apply(const graph *g, const double *x, double *out) {
@@ -62,7 +72,7 @@ static void apply(const graph *g, const double *x, double *out) {
     for (int i = 0; i < g->n; i++) {
         double sum[2] = {0, 0};
         for (int k = g->start[i]; k < g->start[i + 1]; k++) {
-            const double *entry = g->row + 3 * k;
+            const float *entry = g->row + 3 * k;
             for (int d = 0; d < 2; d++)
                 sum[d] += entry[d] * x[g->list[k]];
             out[i] += entry[2] * x[g->list[k]];
@@ -79,14 +89,39 @@ static void graph_check(graph *g) {
     double *right = silt_alloc(n, sizeof *right), *answer = silt_alloc(n, sizeof *answer), *got = silt_alloc(n, sizeof *got),
            *again = silt_alloc(n, sizeof *again);
     silt_front *front = NULL;
+    double share = 0, *work[3];
+    for (int k = 0; k < 3; k++)
+        work[k] = silt_alloc((size_t)g->n, sizeof **work);
+    int more = 0;
     for (size_t i = 0; i < n; i++)
         answer[i] = silt_uniform(&g->state) - 0.5;
     apply(g, answer, right);
     silt_front_order(&front, &g->matrix, g->x);
     assert_int_equal(silt_front_factor(front, &g->matrix), -1);
-    silt_front_solve(front, right, got);
+    assert_true(silt_front_mend(front, &g->matrix, right, 1e-14, got, work, &share, &more));
     for (size_t i = 0; i < n; i++)
         assert_true(fabs(got[i] - answer[i]) < 1e-11);
+    assert_in_range(more, 0, 3);
+    // that measured what a solve alone leaves
+    more = 0;
+    assert_true(silt_front_mend(front, &g->matrix, right, 1e-3, got, work, &share, &more));
+    assert_int_equal(more, 0);
+    silt_front_apply(&g->matrix, got, again);
+    for (size_t i = 0; i < n; i++)
+        assert_true(fabs(again[i] - right[i]) < 1e-5 * g->whole[i]);
+    // whatever the working space holds; nought; what is no number
+    for (size_t i = 0; i < n; i++)
+        work[0][i] = work[1][i] = work[2][i] = NAN;
+    share = 0;
+    assert_true(silt_front_mend(front, &g->matrix, right, 1e-14, got, work, &share, &more));
+    assert_true(fabs(got[n - 1] - answer[n - 1]) < 1e-11 && share > 0 && share < 1e-4);
+    memset(again, 0, n * sizeof *again);
+    assert_true(silt_front_mend(front, &g->matrix, again, 1e-14, again, work, &share, &more));
+    assert_true(again[n / 2] == 0);
+    again[n / 2] = NAN;
+    share = 0;
+    assert_false(silt_front_mend(front, &g->matrix, again, 1e-3, got, work, &share, &more));
+    silt_front_solve(front, right, got);
     memcpy(again, right, n * sizeof *right);
     silt_front_order(&front, &g->matrix, g->x);
     assert_int_equal(silt_front_factor(front, &g->matrix), -1);
@@ -101,6 +136,8 @@ static void graph_check(graph *g) {
     free(answer);
     free(got);
     free(again);
+    for (int k = 0; k < 3; k++)
+        free(work[k]);
     graph_close(g);
 }
 
@@ -122,6 +159,37 @@ static void cloud(void **state) {
         graph_join(&g, near);
         graph_check(&g);
     }
+}
+
+static bool close_by(const graph *g, int i, int j) {
+    return silt_square(g->x[2 * i] - g->x[2 * j]) + silt_square(g->x[2 * i + 1] - g->x[2 * j + 1]) < silt_square(0.03);
+}
+
+// the same bits for any number of threads
+static void threads(void **state) {
+    (void)state;
+    graph g;
+    const int n = 2500;
+    graph_open(&g, n);
+    scatter(&g);
+    graph_join(&g, close_by);
+    double *right = silt_alloc((size_t)n, sizeof *right), *got[3];
+    for (int i = 0; i < n; i++)
+        right[i] = silt_uniform(&g.state) - 0.5;
+    for (int k = 0; k < 3; k++) {
+        silt_front *front = NULL;
+        got[k] = silt_alloc((size_t)n, sizeof **got);
+        g.matrix.threads = k + 1;
+        silt_front_order(&front, &g.matrix, g.x);
+        assert_int_equal(silt_front_factor(front, &g.matrix), -1);
+        silt_front_solve(front, right, got[k]);
+        assert_memory_equal(got[k], got[0], (size_t)n * sizeof **got);
+        silt_front_free(&front);
+    }
+    for (int k = 0; k < 3; k++)
+        free(got[k]);
+    free(right);
+    graph_close(&g);
 }
 
 // joined across the border, so that nothing is near in place
@@ -183,6 +251,55 @@ static void odd(void **state) {
     graph_check(&g);
 }
 
+// A matrix that knows its answer up to a constant, but for a billionth: what single precision cannot see is fixed at some node, and
+// the answer is one all the same.
+static void loose(void **state) {
+    (void)state;
+    graph g;
+    graph_open(&g, 900);
+    scatter(&g);
+    graph_join(&g, near);
+    memset(g.whole, 0, (size_t)g.n * sizeof *g.whole);
+    memset(g.diagonal, 0, (size_t)g.n * sizeof *g.diagonal);
+    for (int i = 0; i < g.n; i++)
+        for (int k = g.start[i]; k < g.start[i + 1]; k++) {
+            float *entry = g.row + 3 * k;
+            entry[0] = entry[1] = 0;
+            entry[2] *= -1;
+            g.diagonal[i] -= entry[2];
+            g.diagonal[g.list[k]] -= entry[2];
+        }
+    for (int i = 0; i < g.n; i++) {
+        g.diagonal[i] += g.diagonal[i] > 0 ? 1e-9 * g.diagonal[i] : 1;
+        g.whole[i] = (float)g.diagonal[i];
+    }
+    double *right = silt_alloc((size_t)g.n, sizeof *right), *got = silt_alloc((size_t)g.n, sizeof *got);
+    for (int i = 0; i < g.n; i++)
+        got[i] = silt_uniform(&g.state) - 0.5;
+    apply(&g, got, right);
+    silt_front *front = NULL;
+    double share = 0, *work[3];
+    for (int k = 0; k < 3; k++)
+        work[k] = silt_alloc((size_t)g.n, sizeof **work);
+    int more = 0;
+    silt_front_order(&front, &g.matrix, g.x);
+    assert_int_equal(silt_front_factor(front, &g.matrix), -1);
+    assert_true(silt_front_mend(front, &g.matrix, right, 1e-10, got, work, &share, &more));
+    assert_in_range(more, 0, 12);
+    double *again = silt_alloc((size_t)g.n, sizeof *again);
+    apply(&g, got, again);
+    for (int i = 0; i < g.n; i++)
+        assert_true(fabs(again[i] - right[i]) < 1e-8 * g.whole[i]);
+    printf("up to a constant: %d more solves\n", more);
+    free(right);
+    free(got);
+    free(again);
+    silt_front_free(&front);
+    for (int k = 0; k < 3; k++)
+        free(work[k]);
+    graph_close(&g);
+}
+
 // every size of panel around the width that vectors have: L L^T is what came in
 static void dense(void **state) {
     (void)state;
@@ -190,17 +307,20 @@ static void dense(void **state) {
     for (int own = 1; own < 27; own++)
         for (int wide = own; wide < own + 40; wide += 3) {
             const int rest = wide - own;
-            double full[70][70], l[70][70] = {{0}}, panel[70 * 70 + DENSE_PAD] = {0}, update[70 * 70] = {0};
+            double full[70][70], l[70][70] = {{0}};
+            float panel[70 * 70 + DENSE_PAD] = {0}, update[70 * 70 + DENSE_PAD] = {0}, whole[70 + DENSE_PAD];
             for (int i = 0; i < wide; i++)
                 for (int j = 0; j <= i; j++)
-                    full[i][j] = full[j][i] = i == j ? wide : silt_uniform(&seed) - 0.5;
+                    full[i][j] = full[j][i] = i == j ? wide : (float)silt_uniform(&seed) - 0.5f;
+            for (int i = 0; i < 70; i++)
+                whole[i] = (float)wide;
             for (int j = 0; j < own; j++)
                 for (int i = j; i < wide; i++)
-                    panel[i + j * wide] = full[i][j];
+                    panel[i + j * wide] = (float)full[i][j];
             for (int j = 0; j < rest; j++)
                 for (int i = j; i < rest; i++)
-                    update[i + j * rest] = full[own + i][own + j];
-            assert_int_equal(silt_dense_factor(own, wide, panel), -1);
+                    update[i + j * rest] = (float)full[own + i][own + j];
+            assert_int_equal(silt_dense_factor(own, wide, whole, panel), -1);
             silt_dense_update(own, wide, panel, update);
             for (int j = 0; j < own; j++)
                 for (int i = j; i < wide; i++)
@@ -210,18 +330,18 @@ static void dense(void **state) {
                     double sum = i >= own && j >= own ? update[(i - own) + (j - own) * rest] : 0;
                     for (int c = 0; c < own; c++)
                         sum += l[i][c] * l[j][c];
-                    assert_true(fabs(sum - full[i][j]) < 1e-12 * wide);
+                    assert_true(fabs(sum - full[i][j]) < 4 * ROUNDED * wide);
                 }
             // forward and backward with the update left out: the rest of t is what it was less L21 y
-            double t[70], y[70];
+            float t[70 + DENSE_PAD] = {0}, y[70 + DENSE_PAD] = {0};
             for (int i = 0; i < wide; i++)
-                t[i] = y[i] = silt_uniform(&seed);
+                t[i] = y[i] = (float)silt_uniform(&seed);
             silt_dense_forward(own, wide, panel, t);
             for (int i = 0; i < wide; i++) {
                 double sum = i < own ? 0 : t[i];
                 for (int c = 0; c < own && c <= i; c++)
                     sum += l[i][c] * t[c];
-                assert_true(fabs(sum - y[i]) < 1e-12);
+                assert_true(fabs(sum - y[i]) < 4 * ROUNDED * wide);
             }
             memcpy(y, t, sizeof y);
             silt_dense_backward(own, wide, panel, t);
@@ -229,15 +349,16 @@ static void dense(void **state) {
                 double sum = 0;
                 for (int i = j; i < wide; i++)
                     sum += l[i][j] * t[i];
-                assert_true(fabs(sum - y[j]) < 1e-12);
+                assert_true(fabs(sum - y[j]) < 4 * ROUNDED * wide);
             }
-            panel[0] = -1;
-            assert_int_equal(silt_dense_factor(own, wide, panel), 0);
+            panel[0] = -1; // not by rounding
+            assert_int_equal(silt_dense_factor(own, wide, whole, panel), 0);
         }
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(cloud), cmocka_unit_test(periodic), cmocka_unit_test(hubs),
-                                       cmocka_unit_test(odd), cmocka_unit_test(dense)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(cloud), cmocka_unit_test(threads), cmocka_unit_test(periodic), cmocka_unit_test(hubs),
+                                       cmocka_unit_test(odd), cmocka_unit_test(loose),
+                                       cmocka_unit_test(dense)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,168 +6,224 @@
 #else
 #define DENSE_CLONES
 #endif
+#pragma GCC diagnostic ignored "-Wpsabi" // vectors are passed within this file only
 #define DENSE_INLINE static inline __attribute__((always_inline))
-#define W 8 // columns that are worked on together, and numbers in a vector
+#define LANES DENSE_PAD // numbers in a vector
+#define C 8             // columns that are worked on together
+#define DEEP 64         // columns that are applied to what follows at one go: panels of large fronts leave the cache otherwise
 
-typedef double vector __attribute__((vector_size(W * sizeof(double)), aligned(sizeof(double))));
+typedef float vector __attribute__((vector_size(LANES * sizeof(float)), aligned(sizeof(float))));
+typedef int bits __attribute__((vector_size(LANES * sizeof(int)), aligned(sizeof(int))));
 
-// out (rows x columns, apart `apart`) -= a b^T over k columns of a and b, `ld` apart; two vectors of rows
-DENSE_INLINE void product_two(int k, size_t ld, const double *a, const double *b, double *out, size_t apart) {
-    vector sum[W][2] = {{{0}}};
+// the first n lanes
+DENSE_INLINE bits lanes_first(int n) {
+    static const int ones[2 * LANES] = {-1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
+    return *(const bits *)(ones + LANES - n);
+}
+
+DENSE_INLINE vector lanes_keep(vector v, bits which) { return (vector)((bits)v & which); }
+
+// out (rows x C, columns `apart` apart) -= a b^T over k columns of a and b, `ld` apart; two vectors of rows
+DENSE_INLINE void product_two(int k, size_t ld, const float *a, const float *b, float *out, size_t apart) {
+    vector sum[C][2] = {{{0}}};
     for (int c = 0; c < k; c++, a += ld, b += ld) {
-        const vector a0 = *(const vector *)a, a1 = *(const vector *)(a + W);
+        const vector a0 = *(const vector *)a, a1 = *(const vector *)(a + LANES);
 #pragma GCC unroll 8
-        for (int j = 0; j < W; j++) {
+        for (int j = 0; j < C; j++) {
             sum[j][0] += a0 * b[j];
             sum[j][1] += a1 * b[j];
         }
     }
 #pragma GCC unroll 8
-    for (int j = 0; j < W; j++) {
+    for (int j = 0; j < C; j++) {
         *(vector *)(out + (size_t)j * apart) -= sum[j][0];
-        *(vector *)(out + (size_t)j * apart + W) -= sum[j][1];
+        *(vector *)(out + (size_t)j * apart + LANES) -= sum[j][1];
     }
 }
 
-// the same for one vector of rows, of which the first `rows` count, and `columns` columns
-DENSE_INLINE void product_one(int k, size_t ld, const double *a, const double *b, double *out, size_t apart, int rows, int columns) {
-    vector sum[W] = {{0}};
+// the same for one vector of rows, of which the first `rows` count, and `columns` columns; what does not count is written as it was
+DENSE_INLINE void product_one(int k, size_t ld, const float *a, const float *b, float *out, size_t apart, int rows, int columns) {
+    const bits which = lanes_first(rows);
+    vector sum[C] = {{0}};
     for (int c = 0; c < k; c++, a += ld, b += ld) {
         const vector a0 = *(const vector *)a;
 #pragma GCC unroll 8
-        for (int j = 0; j < W; j++)
+        for (int j = 0; j < C; j++)
             sum[j] += a0 * b[j];
     }
-    if (rows >= W && columns >= W) {
 #pragma GCC unroll 8
-        for (int j = 0; j < W; j++)
-            *(vector *)(out + (size_t)j * apart) -= sum[j];
-        return;
-    }
-    double part[W][W];
-    memcpy(part, sum, sizeof part);
-    for (int j = 0; j < columns; j++)
-        for (int r = 0; r < rows; r++)
-            out[r + (size_t)j * apart] -= part[j][r];
+    for (int j = 0; j < C; j++)
+        if (j < columns)
+            *(vector *)(out + (size_t)j * apart) -= lanes_keep(sum[j], which);
 }
 
-DENSE_INLINE void product(int k, size_t ld, const double *a, const double *b, double *out, size_t apart, int rows, int columns) {
+DENSE_INLINE void product(int k, size_t ld, const float *a, const float *b, float *out, size_t apart, int rows, int columns) {
     int r = 0;
-    for (; r + 2 * W <= rows && columns >= W; r += 2 * W)
+    for (; r + 2 * LANES <= rows && columns == C; r += 2 * LANES)
         product_two(k, ld, a + r, b, out + r, apart);
-    for (; r < rows; r += W)
-        product_one(k, ld, a + r, b, out + r, apart, rows - r < W ? rows - r : W, columns < W ? columns : W);
+    for (; r < rows; r += LANES)
+        product_one(k, ld, a + r, b, out + r, apart, rows - r < LANES ? rows - r : LANES, columns);
 }
 
 // rows times the inverse of a finished triangle of `columns` columns
-DENSE_INLINE void triangle_rows(int columns, size_t ld, const double *triangle, double *x, int rows) {
-    int r = 0;
-    for (; r + W <= rows && columns == W; r += W) {
-        vector v[W];
+DENSE_INLINE void triangle_rows(const int columns, size_t ld, const float *triangle, float *x, int rows) {
+    for (int r = 0; r < rows; r += LANES) {
+        const bits which = lanes_first(rows - r < LANES ? rows - r : LANES);
+        vector v[C];
 #pragma GCC unroll 8
-        for (int j = 0; j < W; j++) {
-            v[j] = *(vector *)(x + r + (size_t)j * ld);
+        for (int j = 0; j < columns; j++) {
+            vector *to = (vector *)(x + r + (size_t)j * ld);
+            v[j] = *to;
 #pragma GCC unroll 8
             for (int c = 0; c < j; c++)
                 v[j] -= v[c] * triangle[j + (size_t)c * ld];
             v[j] *= triangle[j + (size_t)j * ld];
-            *(vector *)(x + r + (size_t)j * ld) = v[j];
+            *to = (vector)(((bits)v[j] & which) | ((bits)*to & ~which));
         }
     }
-    for (; r < rows; r++)
-        for (int j = 0; j < columns; j++) {
-            double value = x[r + (size_t)j * ld];
-            for (int c = 0; c < j; c++)
-                value -= x[r + (size_t)c * ld] * triangle[j + (size_t)c * ld];
-            x[r + (size_t)j * ld] = value * triangle[j + (size_t)j * ld];
-        }
 }
 
-DENSE_CLONES int silt_dense_factor(int own, int wide, double *panel) {
-    const size_t ld = (size_t)wide;
-    for (int at = 0; at < own; at += W) {
-        const int columns = own - at < W ? own - at : W;
-        double *t = panel + at + ld * (size_t)at;
-        product(at, ld, panel + at, panel + at, t, ld, wide - at, columns);
-        for (int j = 0; j < columns; j++)
-            for (int r = j; r < columns; r++) {
-                double value = t[r + ld * (size_t)j];
-                for (int c = 0; c < j; c++)
-                    value -= t[r + ld * (size_t)c] * t[j + ld * (size_t)c];
-                if (r == j) {
-                    if (!(value > 0))
-                        return at + j;
-                    t[r + ld * (size_t)j] = 1 / sqrt(value);
-                } else
-                    t[r + ld * (size_t)j] = value * t[j + ld * (size_t)j];
+// L of a small triangle, 1/diagonal in the diagonal's place. @return -1, or the column whose pivot is no good
+DENSE_INLINE int triangle_factor(int columns, size_t ld, const float *whole, float *t) {
+    for (int j = 0; j < columns; j++)
+        for (int r = j; r < columns; r++) {
+            float value = t[r + ld * (size_t)j];
+            for (int c = 0; c < j; c++)
+                value -= t[r + ld * (size_t)c] * t[j + ld * (size_t)c];
+            if (r > j) {
+                t[r + ld * (size_t)j] = value * t[j + ld * (size_t)j];
+                continue;
             }
-        triangle_rows(columns, ld, t, t + columns, wide - at - columns);
+            if (!(value > -DENSE_WRONG * whole[j]))
+                return j;
+            t[r + ld * (size_t)j] = 1 / sqrtf(value > DENSE_LEAST * whole[j] ? value : whole[j]);
+        }
+    return -1;
+}
+
+DENSE_CLONES int silt_dense_factor(int own, int wide, const float *whole, float *panel) {
+    const size_t ld = (size_t)wide;
+    for (int begin = 0; begin < own; begin += DEEP) {
+        const int end = begin + DEEP < own ? begin + DEEP : own;
+        const float *done = panel + ld * (size_t)begin;
+        for (int at = begin; at < end; at += C) {
+            const int columns = end - at < C ? end - at : C;
+            float *t = panel + at + ld * (size_t)at;
+            product(at - begin, ld, done + at, done + at, t, ld, wide - at, columns);
+            const int bad = triangle_factor(columns, ld, whole + at, t);
+            if (bad >= 0)
+                return at + bad;
+            if (columns == C)
+                triangle_rows(C, ld, t, t + C, wide - at - C);
+            else
+                triangle_rows(columns, ld, t, t + columns, wide - at - columns);
+        }
+        for (int at = end; at < own; at += C)
+            product(end - begin, ld, done + at, done + at, panel + at + ld * (size_t)at, ld, wide - at, own - at < C ? own - at : C);
     }
     return -1;
 }
 
-DENSE_CLONES void silt_dense_update(int own, int wide, const double *panel, double *update) {
+DENSE_CLONES void silt_dense_update(int own, int wide, const float *panel, float *update) {
+    const size_t ld = (size_t)wide;
     const int rest = wide - own;
-    const double *below = panel + own;
-    for (int at = 0; at < rest; at += W)
-        product(own, (size_t)wide, below + at, below + at, update + at + (size_t)at * (size_t)rest, (size_t)rest, rest - at, rest - at);
+    for (int begin = 0; begin < own; begin += 2 * DEEP) {
+        const int deep = own - begin < 2 * DEEP ? own - begin : 2 * DEEP;
+        const float *below = panel + own + ld * (size_t)begin;
+        for (int at = 0; at < rest; at += C)
+            product(deep, ld, below + at, below + at, update + at + (size_t)at * (size_t)rest, (size_t)rest, rest - at,
+                    rest - at < C ? rest - at : C);
+    }
 }
 
-DENSE_CLONES void silt_dense_forward(int own, int wide, const double *panel, double *t) {
+DENSE_CLONES void silt_dense_forward(int own, int wide, const float *panel, float *t) {
     const size_t ld = (size_t)wide;
-    for (int at = 0; at < own; at += W) {
-        const int columns = own - at < W ? own - at : W;
-        const double *l = panel + at + ld * (size_t)at;
-        double *x = t + at, v[W] = {0};
+    for (int at = 0; at < own; at += C) {
+        const int columns = own - at < C ? own - at : C;
+        const float *l = panel + at + ld * (size_t)at;
+        float *x = t + at, v[C] = {0};
         for (int j = 0; j < columns; j++) {
-            double value = x[j];
+            float value = x[j];
             for (int c = 0; c < j; c++)
                 value -= l[j + ld * (size_t)c] * v[c];
             x[j] = v[j] = value * l[j + ld * (size_t)j];
         }
-        int r = columns;
-        for (; r + W <= wide - at && columns == W; r += W) {
+        for (int r = columns; r < wide - at; r += LANES) {
             vector sum = *(vector *)(x + r);
+            if (columns == C) {
 #pragma GCC unroll 8
-            for (int c = 0; c < W; c++) {
-                __builtin_prefetch(l + r + ld * (size_t)(c + W)); // the columns that come next: a tenth of a solve
-                sum -= v[c] * *(const vector *)(l + r + ld * (size_t)c);
-            }
-            *(vector *)(x + r) = sum;
+                for (int c = 0; c < C; c++) {
+                    __builtin_prefetch(l + r + ld * (size_t)(c + C)); // the columns that come next: a tenth of a solve
+                    sum -= v[c] * *(const vector *)(l + r + ld * (size_t)c);
+                }
+            } else
+                for (int c = 0; c < columns; c++)
+                    sum -= v[c] * *(const vector *)(l + r + ld * (size_t)c);
+            *(vector *)(x + r) = sum; // what is past the end is of no use
         }
-        for (; r < wide - at; r++)
-            for (int c = 0; c < columns; c++)
-                x[r] -= v[c] * l[r + ld * (size_t)c];
     }
 }
 
-DENSE_CLONES void silt_dense_backward(int own, int wide, const double *panel, double *t) {
+// lane j of the sum: all lanes of v[j]. One after the other they took a third of a solve at 10k nodes.
+typedef float half __attribute__((vector_size(C * sizeof(float)), aligned(sizeof(float))));
+DENSE_INLINE void lanes_sum(vector v[C], float out[C]) {
+    const bits even = {0, 16, 2, 18, 4, 20, 6, 22, 8, 24, 10, 26, 12, 28, 14, 30}, odd = {1, 17, 3, 19, 5, 21, 7, 23, 9, 25, 11, 27, 13, 29, 15, 31};
+    const bits two = {0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29}, next = {2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31};
+    const bits low = {0, 1, 2, 3, 16, 17, 18, 19, 8, 9, 10, 11, 24, 25, 26, 27}, high = {4, 5, 6, 7, 20, 21, 22, 23, 12, 13, 14, 15, 28, 29, 30, 31};
+    vector pair[4], four[2];
+#pragma GCC unroll 4
+    for (int j = 0; j < 4; j++)
+        pair[j] = __builtin_shuffle(v[2 * j], v[2 * j + 1], even) + __builtin_shuffle(v[2 * j], v[2 * j + 1], odd);
+#pragma GCC unroll 2
+    for (int j = 0; j < 2; j++)
+        four[j] = __builtin_shuffle(pair[2 * j], pair[2 * j + 1], two) + __builtin_shuffle(pair[2 * j], pair[2 * j + 1], next);
+    const vector all = __builtin_shuffle(four[0], four[1], low) + __builtin_shuffle(four[0], four[1], high);
+    half part[2];
+    memcpy(part, &all, sizeof all);
+    part[0] += part[1];
+    memcpy(out, part, sizeof *part);
+}
+
+DENSE_CLONES void silt_dense_backward(int own, int wide, const float *panel, float *t) {
     const size_t ld = (size_t)wide;
-    for (int at = (own - 1) / W * W; at >= 0; at -= W) {
-        const int columns = own - at < W ? own - at : W;
-        const double *l = panel + at + ld * (size_t)at;
-        double *x = t + at, sum[W] = {0};
-        vector many[W] = {{0}};
-        int r = columns;
-        for (; r + W <= wide - at && columns == W; r += W) {
-            const vector y = *(const vector *)(x + r);
+    for (int at = (own - 1) / C * C; at >= 0; at -= C) {
+        const int columns = own - at < C ? own - at : C;
+        const float *l = panel + at + ld * (size_t)at;
+        float *x = t + at, sum[C];
+        vector many[C] = {{0}};
+        for (int r = columns; r < wide - at; r += LANES) {
+            const int rows = wide - at - r < LANES ? wide - at - r : LANES;
+            const bits which = lanes_first(rows);
+            const vector y = lanes_keep(*(const vector *)(x + r), which);
+            if (columns == C && rows == LANES) {
 #pragma GCC unroll 8
-            for (int c = 0; c < W; c++) {
-                __builtin_prefetch(l + r - ld * (size_t)(W - c));
-                many[c] += y * *(const vector *)(l + r + ld * (size_t)c);
-            }
+                for (int c = 0; c < C; c++) {
+                    __builtin_prefetch(l + r - ld * (size_t)(C - c));
+                    many[c] += y * *(const vector *)(l + r + ld * (size_t)c);
+                }
+            } else
+                for (int c = 0; c < columns; c++)
+                    many[c] += y * lanes_keep(*(const vector *)(l + r + ld * (size_t)c), which);
         }
-        for (int c = 0; c < columns; c++) {
-            for (int k = 0; k < W; k++)
-                sum[c] += many[c][k];
-            for (int k = r; k < wide - at; k++)
-                sum[c] += x[k] * l[k + ld * (size_t)c];
-        }
+        lanes_sum(many, sum);
         for (int j = columns - 1; j >= 0; j--) {
-            double value = x[j] - sum[j];
+            float value = x[j] - sum[j];
             for (int c = j + 1; c < columns; c++)
                 value -= l[c + ld * (size_t)j] * x[c];
             x[j] = value * l[j + ld * (size_t)j];
+        }
+    }
+}
+
+// run by run over all columns: a column's next run, loaded while what went over the end of this one is not yet stored, waits
+DENSE_CLONES void silt_dense_scatter(int n, const int *at, const int *end, const float *update, float **column) {
+    for (int first = 0, last; first < n; first = last) {
+        last = end[first] - first < 4 * LANES ? end[first] : first + 4 * LANES;
+        for (int c = 0; c < last; c++) {
+            const float *from = update + (size_t)c * (size_t)n;
+            float *to = column[at[c]] + at[first] - first;
+            for (int r = c > first ? c : first; r < last; r += LANES)
+                *(vector *)(to + r) += lanes_keep(*(const vector *)(from + r), lanes_first(last - r < LANES ? last - r : LANES));
         }
     }
 }

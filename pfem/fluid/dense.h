@@ -1,22 +1,33 @@
 /** @file dense.h
  * Small dense triangles, columns one after the other: what fronts are factored and solved with. Made for tens to hundreds of rows,
  * where a library spends more on being called than on the work; compiled for several processors, the best is taken at the start.
+ * Single precision: what is rounded is mended from outside (front_solve.c).
  */
 #ifndef SILT_DENSE_H
 #define SILT_DENSE_H
 
 #include "base.h"
 
-#define DENSE_PAD 16 // numbers that may be read (not used) past the end of a panel
+// numbers past the end of a panel, an update or a right side that may be read and are written as they were. Whatever they are changes
+// nothing, but where they are denormal, as whole numbers taken for floats are, a product takes five times as long.
+#define DENSE_PAD 16
+#define DENSE_LEAST 3e-6f // share of the matrix's diagonal below which a pivot is rounding: several hundred sums of 6e-8
+
+#define DENSE_WRONG 1e-3f // share below which a negative one is none: the worst that a thousand roundings one way come to is 6e-5
 
 /** A panel of `wide` rows and `own` columns, lower triangle first: L of its top, L21 of the rest, 1/diagonal in the diagonal's place.
- * @return -1, or the column with a pivot that is not positive */
-int silt_dense_factor(int own, int wide, double *panel);
+ * @param whole  the matrix's diagonal, of each column; it takes the place of a pivot that is rounding: what is known up to a constant
+ * gets it fixed there
+ * @return -1, or a column whose pivot is negative, and not by rounding */
+int silt_dense_factor(int own, int wide, const float *whole, float *panel);
 /** update (wide - own rows and columns, lower triangle; above it anything) -= L21 L21^T */
-void silt_dense_update(int own, int wide, const double *panel, double *update);
-/** t (wide) = [L 0; L21 1]^-1 t */
-void silt_dense_forward(int own, int wide, const double *panel, double *t);
+void silt_dense_update(int own, int wide, const float *panel, float *update);
+/** t (wide, what is past it is lost) = [L 0; L21 1]^-1 t */
+void silt_dense_forward(int own, int wide, const float *panel, float *t);
 /** t (the first own) = L^-T (t - L21^T rest of t) */
-void silt_dense_backward(int own, int wide, const double *panel, double *t);
+void silt_dense_backward(int own, int wide, const float *panel, float *t);
+/** Adds an update of n rows and columns, lower triangle, to the columns of a front, which start at row 0: row r goes to at[r]. at rises,
+ * by one up to the row before end[r]. */
+void silt_dense_scatter(int n, const int *at, const int *end, const float *update, float **column);
 
 #endif

@@ -18,7 +18,7 @@ void silt_fluid_clear(silt_fluid *f) {
                        f->level_force, f->level_brake, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
                        f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->pressure_new, f->v_start, f->normal, f->given, f->cg[0],
-                       f->cg[1], f->cg[2]};
+                       f->cg[1]};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
     free(f->piece);
@@ -45,7 +45,7 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         f->field = silt_grow(f->field, &have, (need) * (per), sizeof *f->field);                                       \
     } while (0)
     if (n_node > f->node_capacity) {
-        const int need = n_node + n_node / 2 + 64, have_nodes = f->node_capacity;
+        const int need = n_node + n_node / 8 + 64, have_nodes = f->node_capacity;
         ROOM(x_mid, D, have_nodes, need);
         ROOM(w, D, have_nodes, need);
         ROOM(star, D, have_nodes, need);
@@ -56,8 +56,9 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         ROOM(projection, D, have_nodes, need);
         ROOM(normal, D, have_nodes, need);
         ROOM(given, D, have_nodes, need);
-        for (int k = 0; k < 3; k++)
+        for (int k = 0; k < 2; k++)
             ROOM(cg[k], D, have_nodes, need);
+        f->cg[2] = f->reaction; // found when all is solved
         ROOM(v_start, D, have_nodes, need);
         ROOM(pressure_new, 1, have_nodes, need);
         ROOM(projection_weight, 1, have_nodes, need);
@@ -66,7 +67,6 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         ROOM(inertia, 1, have_nodes, need);
         ROOM(friction, 1, have_nodes, need);
         ROOM(residual, 1, have_nodes, need);
-        ROOM(stand, 1, have_nodes, need);
         ROOM(rate, 1, have_nodes, need);
         ROOM(increment, 1, have_nodes, need);
         ROOM(hold, 1, have_nodes, need);
@@ -75,7 +75,7 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         f->node_capacity = need;
     }
     if (n_cell > f->cell_capacity) {
-        const int need = n_cell + n_cell / 2 + 64, have_cells = f->cell_capacity;
+        const int need = n_cell + n_cell / 8 + 64, have_cells = f->cell_capacity;
         ROOM(flux, (D + 1) * D, have_cells, need);
         ROOM(cell_volume, 1, have_cells, need);
         ROOM(start, 1, have_cells, need);
@@ -101,6 +101,8 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
             belts |= s->scene->wall[k].velocity[d] != 0;
     if (belts)
         SILT_RESERVE(f->belt, f->belt_capacity, D * n_node + 1);
+    if (s->scene->fluid.scheme == SCHEME_FRACTIONAL)
+        SILT_RESERVE(f->stand, f->stand_capacity, n_node + 1);
     if (silt_levels_any(s->scene)) {
         SILT_RESERVE(f->level_force, f->level_capacity, D * n_node + 1);
         SILT_RESERVE(f->level_brake, f->level_brake_capacity, n_node + 1);

@@ -29,7 +29,7 @@ typedef struct silt_step {
 /** working space and results of a step; arrays grow only */
 typedef struct silt_fluid {
     int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity,
-        potential_capacity, level_capacity, level_brake_capacity;
+        potential_capacity, stand_capacity, level_capacity, level_brake_capacity;
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
@@ -42,7 +42,7 @@ typedef struct silt_fluid {
     double *shift;        // owned, dim per node, m/s: carries positions, not momentum, to where debts are paid; NULL without volume control
     double *level_force;  // owned, dim per node, N, of the water behind openings with a level; NULL without such openings
     double *level_brake;  // owned, per node, kg/s, part of friction: pressure that water loses as it comes in, over its speed
-    double *stand;        // owned, per node, kg/s, added to both sides where explicit viscosity would not be stable
+    double *stand;        // owned, per node, kg/s, added to both sides where explicit viscosity would not be stable; NULL without
     double *potential;    // owned, per node, Pa, density times the potential of a central body force at x_mid; NULL without one
     double *belt;         // owned, dim per node, velocity of a wall's surface along itself; NULL without such walls
     double *mass;         // owned, per node, lumped mass of water, kg
@@ -60,7 +60,7 @@ typedef struct silt_fluid {
     double *normal;       // owned, dim per node: silt_walls_hold's vector
     double *given;        // owned, dim per node, velocity of what is held
     silt_wall_normals wall_normals; // owned, of nodes on bent walls
-    double *cg[3];        // owned, dim per node, momentum solver
+    double *cg[3];        // dim per node, working space of the momentum solver and others: two owned, the third lies in reaction
     double *pressure_new, *v_start; // owned, 1 and dim per node: kept apart until the step is accepted
     int *piece, *walk;    // owned, per node: lowest node of its piece of water; working space
     uint8_t *closed;      // owned, see silt_closed_pieces

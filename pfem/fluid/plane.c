@@ -1,30 +1,55 @@
 // the pressure system in two dimensions: rows of G and couplings of L, summed and factored front by front
-#include "plane.h"
 #include "front.h"
+#include "parallel.h"
+#include "plane.h"
 
 struct silt_plane {
     silt_front *front;    // owned
+    double share;         // of a right side that a solve with the factor leaves; 0: not known yet
+    silt_front_matrix matrix; // of the mesh that the factor belongs to
     int64_t revision;     // of the mesh that its order belongs to
-    double *star;         // owned, 3 per entry of the mesh's neighbour lists: G, free part; L
-    double *weight;       // owned, per node, 1/inertia
-    double *own, *whole;  // owned, per node, diagonal of L and of the sum
+    float *star;          // owned, 3 per entry of the mesh's neighbour lists: G, free part; L
+    float *weight;        // owned, per node, 1/inertia
+    double *own;          // owned, per node, diagonal of L
+    float *whole;         // owned, per node, diagonal of the sum
+    double *row;          // owned, of the present node
     int *place;           // owned, per node
-    int star_capacity, weight_capacity, own_capacity, whole_capacity, place_capacity;
+    int star_capacity, weight_capacity, own_capacity, whole_capacity, place_capacity, row_capacity;
 };
+
+// One row of G and couplings of L with neighbours of higher number, rounded so that both still let a constant pass: what is lacking
+// goes to the node's own entry, which is nought but on the boundary and so is rounded a million times finer.
+static inline void row_round(int size, int self, const double *row, float *out) {
+    double lost[2] = {0, 0};
+    for (int k = 0; k < size; k++) {
+        for (int d = 0; d < 2; d++) {
+            out[3 * k + d] = (float)row[3 * k + d];
+            lost[d] += row[3 * k + d] - out[3 * k + d];
+        }
+        out[3 * k + 2] = k > self ? (float)row[3 * k + 2] : 0;
+    }
+    for (int d = 0; d < 2; d++)
+        out[3 * self + d] = (float)(out[3 * self + d] + lost[d]);
+}
 
 // what silt_front needs: rows of G with the couplings of L; the diagonal of L and that of the whole sum
 static void rows_assemble(silt_plane *p, const silt_fluid *f, const silt_mesh *mesh) {
     enum { D = 2, M = 3 };
-    SILT_RESERVE(p->star, p->star_capacity, 3 * mesh->neighbour_start[mesh->n_node] + 1);
-    SILT_RESERVE(p->place, p->place_capacity, mesh->n_node + 1);
-    SILT_RESERVE(p->weight, p->weight_capacity, mesh->n_node + 1);
-    SILT_RESERVE(p->own, p->own_capacity, mesh->n_node + 1);
-    SILT_RESERVE(p->whole, p->whole_capacity, mesh->n_node + 1);
-    memset(p->whole, 0, (size_t)mesh->n_node * sizeof *p->whole);
+    const int n = mesh->n_node;
+    SILT_RESERVE(p->star, p->star_capacity, 3 * mesh->neighbour_start[n] + 1);
+    SILT_RESERVE(p->place, p->place_capacity, n + 1);
+    SILT_RESERVE(p->weight, p->weight_capacity, n + 1);
+    SILT_RESERVE(p->own, p->own_capacity, n + 1);
+    SILT_RESERVE(p->whole, p->whole_capacity, n + 1);
+    double *own = p->own;
+    float *whole = p->whole;
     int *place = p->place; // of a neighbour in the present node's list
-    for (int i = 0; i < mesh->n_node; i++) {
+    memset(whole, 0, (size_t)n * sizeof *whole);
+    memset(own, 0, (size_t)n * sizeof *own);
+    for (int i = 0; i < n; i++) {
         const int start = mesh->neighbour_start[i], size = mesh->neighbour_start[i + 1] - start;
-        double *row = p->star + 3 * start;
+        SILT_RESERVE(p->row, p->row_capacity, 3 * size);
+        double *row = p->row;
         memset(row, 0, (size_t)(3 * size) * sizeof *row);
         for (int k = 0; k < size; k++)
             place[mesh->neighbour[start + k]] = k;
@@ -39,17 +64,19 @@ static void rows_assemble(silt_plane *p, const silt_fluid *f, const silt_mesh *m
                 entry[2] += weight * (mine[0] * flux[D * b] + mine[1] * flux[D * b + 1]);
             }
         }
-        p->own[i] = row[3 * place[i] + 2];
-        p->whole[i] += p->own[i];
-        for (int k = 0; k <= place[i]; k++) // the others are their neighbours'
-            row[3 * k + 2] = 0;
-        p->weight[i] = !mesh->wet[i] || f->hold[i] == HOLD_ALL ? 0 : 1 / f->inertia[i];
-        for (int k = 0; k < size; k++) {
-            double *g = row + 3 * k;
-            if (f->hold[i] != HOLD_FREE)
-                silt_hold_project(f, i, g);
-            p->whole[mesh->neighbour[start + k]] += p->weight[i] * silt_dot(D, g, g);
+        for (int k = 0; k < size && f->hold[i] != HOLD_FREE; k++)
+            silt_hold_project(f, i, row + 3 * k);
+        float *star = p->star + 3 * start;
+        row_round(size, place[i], row, star);
+        const float weigh = p->weight[i] = !mesh->wet[i] || f->hold[i] == HOLD_ALL ? 0 : (float)(1 / f->inertia[i]);
+        for (int k = 0; k < size; k++)
+            whole[mesh->neighbour[start + k]] += weigh * (star[3 * k] * star[3 * k] + star[3 * k + 1] * star[3 * k + 1]);
+        double sum = own[i];
+        for (int k = place[i] + 1; k < size; k++) {
+            own[mesh->neighbour[start + k]] -= star[3 * k + 2];
+            sum -= star[3 * k + 2];
         }
+        own[i] = sum;
     }
 }
 
@@ -64,22 +91,32 @@ silt_status silt_plane_factor(silt_plane **plane, const silt_fluid *f, const sil
     silt_plane *p = *plane;
     const silt_mesh *mesh = s->mesh;
     rows_assemble(p, f, mesh);
-    for (int j = 0; j < mesh->n_node; j++)
-        p->own[j] += silt_pressure_pin(mesh, pinned, j, p->whole[j]);
-    const silt_front_matrix matrix = {.n = mesh->n_node, .neighbour_start = mesh->neighbour_start, .neighbour = mesh->neighbour,
-                                      .row = p->star, .weight = p->weight, .diagonal = p->own};
+    for (int j = 0; j < mesh->n_node; j++) {
+        const double sum = p->whole[j] + p->own[j], pin = silt_pressure_pin(mesh, pinned, j, sum);
+        p->own[j] += pin;
+        p->whole[j] = (float)(sum + pin);
+    }
+    p->matrix = (silt_front_matrix){.n = mesh->n_node, .neighbour_start = mesh->neighbour_start, .neighbour = mesh->neighbour,
+                                      .row = p->star, .weight = p->weight, .diagonal = p->own, .whole = p->whole,
+                                    .threads = silt_threads(mesh->n_node)};
     if (!p->front || p->revision != mesh->revision)
-        SILT_CLOCKED(analyse, silt_front_order(&p->front, &matrix, s->nodes->x));
+        SILT_CLOCKED(analyse, silt_front_order(&p->front, &p->matrix, s->nodes->x));
     p->revision = mesh->revision;
+    p->share = 0;
     int bad;
-    SILT_CLOCKED(factor, bad = silt_front_factor(p->front, &matrix));
+    SILT_CLOCKED(factor, bad = silt_front_factor(p->front, &p->matrix));
     if (bad < 0)
         return SILT_OK;
     p->revision = -1;
     return silt_pressure_indefinite(s, bad, err);
 }
 
-void silt_plane_solve(silt_plane *p, const double *right, double *out) { silt_front_solve(p->front, right, out); }
+silt_status silt_plane_solve(silt_plane *p, silt_fluid *f, const double *right, double tolerance, double *out, silt_error *err) {
+    double *const work[3] = {f->cg[0], f->cg[0] + p->matrix.n, f->cg[1]};
+    if (silt_front_mend(p->front, &p->matrix, right, tolerance, out, work, &p->share, &f->pressure_iterations))
+        return SILT_OK;
+    return silt_fail(err, SILT_FAILED, "the pressure system could not be solved (%d nodes)", p->matrix.n);
+}
 
 void silt_plane_forget(silt_plane *p) {
     if (p)
@@ -96,6 +133,7 @@ void silt_plane_free(silt_plane **plane) {
     free(p->own);
     free(p->whole);
     free(p->place);
+    free(p->row);
     free(p);
     *plane = NULL;
 }

@@ -11,7 +11,8 @@ typedef struct silt_plane silt_plane;
 
 /** sum_i G_i^T P_i G_i / inertia_i + L; pinned: nodes that hold the pressure's level. Makes *plane at first. */
 silt_status silt_plane_factor(silt_plane **plane, const silt_fluid *fluid, const silt_step *step, const uint8_t *pinned, silt_error *err);
-void silt_plane_solve(silt_plane *plane, const double *right, double *out);
+/** to `tolerance` relative to the right side; the fluid lends working space and counts the iterations beyond one solve with the factor */
+silt_status silt_plane_solve(silt_plane *plane, silt_fluid *fluid, const double *right, double tolerance, double *out, silt_error *err);
 /** the next factor has an order of its own */
 void silt_plane_forget(silt_plane *plane);
 void silt_plane_free(silt_plane **plane);

@@ -171,8 +171,7 @@ silt_status silt_pressure_solve(silt_pressure *p, silt_fluid *f, const double *r
         return silt_space_solve(p->space, right, tolerance, x, &f->pressure_iterations, err);
     if (!p->in_plane)
         return factor_solve(&p->main, right, x, err);
-    silt_plane_solve(p->plane, right, x);
-    return SILT_OK;
+    return silt_plane_solve(p->plane, f, right, tolerance, x, err);
 }
 
 silt_status silt_pressure_solve_stiff(silt_pressure *p, const double *right, double *increment, silt_error *err) {

@@ -271,6 +271,7 @@ static void main_calm(char **argv) {
 }
 
 int main(int argc, char **argv) {
+    silt_memory_settle();
     main_arguments a = {.frame = -2};
     silt_error err = {0};
     const char *word = argc > 1 ? argv[1] : "";
