@@ -38,6 +38,7 @@ typedef struct silt_piece {
     int *mark;     // owned, per column: where it stands in the row at hand, or less than that row's first
     double *row;   // owned, per column
     int index_capacity, value_capacity, mark_capacity, row_capacity;
+    char apart[128]; // from the next one, which another thread counts in
 } silt_piece;
 
 struct silt_coarse {
