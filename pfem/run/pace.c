@@ -3,6 +3,7 @@
 
 #define STEP_FEW    0.03 // share of the water's nodes that may be spray
 #define STEP_SPRAY  2    // times the root mean square of the water's speed
+#define STEP_FLYING 4    // drops in free flight, whose paths are exact, may cross as many shares of a cell in the plane
 #define STEP_BINS   64
 
 // time in which a wall that moves passes a cell of the water on it: a gate also that slides along the water
@@ -38,7 +39,8 @@ static double spray_speed(const silt_run *run) {
 }
 
 // Time in which a node crosses a cell. What little spray there is costs steps and is worth none: it may cross up to twice as
-// much as the rest. Not so drops in free flight: where they land they would leave holes (0.5 % of the collapse in space at 10 cells)
+// much as the rest, drops in free flight four times in the plane: the collapse at 40 cells takes 642 steps in place of 990, its volume
+// error stays. In space it does not, 0.3 to 0.6 % in place of 0.05 at 10 cells, where drops land: there they set the pace too.
 static double crossing_time(const silt_run *run) {
     const silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
@@ -51,9 +53,9 @@ static double crossing_time(const silt_run *run) {
             if (nodes->kind[i] == NODE_CORNER || nodes->kind[i] == NODE_BED || speed == 0)
                 continue;
             const double time = silt_node_h(nodes, i, run->scene->fluid.size) / speed;
-            const bool water = nodes->kind[i] == NODE_FLUID && i < run->mesh.n_node && run->mesh.wet[i];
+            const bool wet = i < run->mesh.n_node && run->mesh.wet[i], water = nodes->kind[i] == NODE_FLUID && wet;
             if (!water || speed < spray)
-                every = silt_min(every, time);
+                every = silt_min(every, D == 2 && nodes->kind[i] == NODE_FLUID && !wet ? STEP_FLYING * time : time);
             else if (pass == 0)
                 least = silt_min(least, time);
             else if (time < 2 * least)
