@@ -162,9 +162,47 @@ static void test_refused(void **unused) {
     lattice_free(&a);
 }
 
+// Rows of three blocks that are coupled with 0.6 to each other: the matrix is positive definite (1 - 0.6), what Gauss-Seidel takes of it
+// when the blocks do not see each other, 1 - 1.2, is not, and r . z came out as -0.2 r . r
+static void across_blocks(void **state) {
+    (void)state;
+    const int third = 8000, n = 4 * third;
+    int *start = silt_alloc((size_t)n + 1, sizeof *start), *index = silt_alloc(5 * (size_t)n, sizeof *index), at = 0;
+    double *value = silt_alloc(5 * (size_t)n, sizeof *value), *r = silt_alloc((size_t)n, sizeof *r), *z = silt_alloc((size_t)n, sizeof *z);
+    for (int i = 0; i < n; i++) {
+        start[i] = at;
+        r[i] = i < 3 * third ? 1 : 0;
+        for (int j = i % third; j < n; j += third) // what is below the row at hand, itself with its two neighbours, what is above
+            if (j == i) {
+                for (int k = i - 1; k <= i + 1; k++)
+                    if (k >= 0 && k < n && k / third == i / third) {
+                        index[at] = k;
+                        value[at++] = k == i ? 1.02 : -0.01;
+                    }
+            } else if (i < 3 * third && j < 3 * third) {
+                index[at] = j;
+                value[at++] = 0.6;
+            }
+    }
+    start[n] = at;
+    silt_coarse *c = NULL;
+    assert_true(silt_coarse_build(&c, n, start, index, value));
+    cycle(c, n, r, z);
+    double product = 0;
+    for (int i = 0; i < n; i++)
+        product += r[i] * z[i];
+    assert_true(product > 0.05 * 3 * third);
+    silt_coarse_free(&c);
+    free(start);
+    free(index);
+    free(value);
+    free(r);
+    free(z);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_symmetric),
+        cmocka_unit_test(across_blocks), cmocka_unit_test(test_symmetric),
         cmocka_unit_test(test_iterations),
         cmocka_unit_test(test_refused),
     };
