@@ -171,7 +171,7 @@ static void across_blocks(void **state) {
     double *value = silt_alloc(5 * (size_t)n, sizeof *value), *r = silt_alloc((size_t)n, sizeof *r), *z = silt_alloc((size_t)n, sizeof *z);
     for (int i = 0; i < n; i++) {
         start[i] = at;
-        r[i] = i < 3 * third ? 1 : 0;
+        r[i] = i < 3 * third ? 1 - 2 * (i % third % 2) : 0; // rough: the coarser level does not see it
         for (int j = i % third; j < n; j += third) // what is below the row at hand, itself with its two neighbours, what is above
             if (j == i) {
                 for (int k = i - 1; k <= i + 1; k++)
