@@ -98,16 +98,6 @@ static int nested_dissect(silt_nested *f, const silt_mesh *mesh, int *part, int 
     return last < end ? nested_add(f, last, end, waiting, depth) : waiting;
 }
 
-static void nested_sort(int n, int *row) {
-    for (int a = 1; a < n; a++) {
-        const int key = row[a];
-        int b = a - 1;
-        for (; b >= 0 && row[b] > key; b--)
-            row[b + 1] = row[b];
-        row[b + 1] = key;
-    }
-}
-
 // rows below every block: those that its children hand on, and the neighbours of its nodes
 static void nested_rows(silt_nested *f, const silt_mesh *mesh) {
     const int n = f->n;
@@ -141,7 +131,7 @@ static void nested_rows(silt_nested *f, const silt_mesh *mesh) {
                     row[count++] = place;
                 }
             }
-        nested_sort(count, row);
+        silt_sort_few(count, row);
         b->row_end = filled + count;
         while (count % STRIP)
             row[count++] = n;

@@ -196,3 +196,13 @@ uint64_t silt_random(uint64_t *state) {
 double silt_uniform(uint64_t *state) {
     return (double)(silt_random(state) >> 11) * 0x1p-53;
 }
+
+void silt_sort_few(int n, int *number) {
+    for (int a = 1; a < n; a++) {
+        const int key = number[a];
+        int b = a - 1;
+        for (; b >= 0 && number[b] > key; b--)
+            number[b + 1] = number[b];
+        number[b + 1] = key;
+    }
+}

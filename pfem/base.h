@@ -27,6 +27,8 @@ silt_status silt_fail(silt_error *err, silt_status status, const char *format, .
  * Ends the program with a message only when memory is exhausted. Returns the (moved) array. */
 void *silt_grow(void *data, int *capacity, int need, size_t size);
 void *silt_alloc(size_t n, size_t size); /**< zeroed; never NULL (ends the program when memory is exhausted) */
+/** few numbers, or such as nearly rise, into rising order, in place: by insertion */
+void silt_sort_few(int n, int *number);
 /** Room for `need` items, what was in it is lost; zeroed where it is new. For large arrays that last. */
 void *silt_room(void *data, size_t *capacity, size_t need, size_t size);
 /** For a program that is silt's alone: arrays that last come from the system, so that they leave no holes in the heap (a tenth of the

@@ -203,6 +203,9 @@ void silt_cell_facet(int dim, const int *cell, int a, int facet[3]);
 /** true when the nodes share a patch of the mesh's walls */
 bool silt_mesh_share(const silt_mesh *mesh, const silt_nodes *nodes, int n, const int *node);
 void silt_mesh_clear(silt_mesh *mesh);
+/** Pattern of a symmetric matrix over nodes and their neighbours: the lower triangle by columns, rows rising. start: n_node + 1 numbers,
+ * index: as many as the lists hold pairs with j >= i */
+void silt_mesh_lower(const silt_mesh *mesh, int *start, int *index);
 /** where the neighbour j of node i stands in mesh->neighbour */
 int silt_neighbour_index(const silt_mesh *mesh, int i, int j);
 double silt_cell_area(const double *x, const int *cell); // 2-D

@@ -179,16 +179,6 @@ static int dissect(silt_front *f, const silt_front_matrix *q, int begin, int end
     return b < end ? block_add(f, b, end, waiting, depth) : waiting;
 }
 
-static void sort_rows(int n, int *row) {
-    for (int a = 1; a < n; a++) {
-        const int key = row[a];
-        int b = a - 1;
-        for (; b >= 0 && row[b] > key; b--)
-            row[b + 1] = row[b];
-        row[b + 1] = key;
-    }
-}
-
 // adds places above the block that the mark has not seen
 static int rows_add(silt_front *f, int count, int begin, int mark, int above, const int *place, int n) {
     for (int k = 0; k < n; k++)
@@ -237,7 +227,7 @@ static size_t rows_find(silt_front *f, const silt_front_matrix *q) {
                     count = rows_add(f, count, filled, e, b->end, &f->place[q->neighbour[m]], 1);
             }
         }
-        sort_rows(count, f->row + filled);
+        silt_sort_few(count, f->row + filled);
         filled += count;
         b->row_end = filled;
         b->value = value;

@@ -47,14 +47,8 @@ static void pattern_build(silt_pressure *p, silt_system *system, const silt_mesh
     const int n = mesh->n_node;
     SILT_RESERVE(p->row, p->row_capacity, n + 1);
     const int filled = (mesh->neighbour_start[n] + n) / 2; // lists hold the node itself
-    int *start = silt_factor_pattern(&system->factor, n, filled), *index = system->factor.index, at = 0;
-    for (int j = 0; j < n; j++) {
-        start[j] = at;
-        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
-            if (mesh->neighbour[k] >= j)
-                index[at++] = mesh->neighbour[k];
-    }
-    start[n] = at;
+    int *start = silt_factor_pattern(&system->factor, n, filled), *index = system->factor.index;
+    silt_mesh_lower(mesh, start, index);
     system->revision = mesh->revision;
 }
 

@@ -81,14 +81,7 @@ static void pattern(silt_blocks *b, const silt_mesh *mesh, int m, const int *ord
 static int *node_order(const silt_mesh *mesh) {
     const int n = mesh->n_node;
     int *start = silt_alloc((size_t)n + 1, sizeof *start), *index = silt_alloc((size_t)mesh->neighbour_start[n] + 1, sizeof *index);
-    int at = 0;
-    for (int j = 0; j < n; j++) {
-        start[j] = at;
-        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
-            if (mesh->neighbour[k] >= j)
-                index[at++] = mesh->neighbour[k];
-    }
-    start[n] = at;
+    silt_mesh_lower(mesh, start, index);
     int *order;
     SILT_CLOCKED(analyse, order = silt_factor_order(n, start, index));
     free(start);

@@ -20,6 +20,17 @@ void silt_group_join(int *parent, const int *cell) {
     }
 }
 
+void silt_mesh_lower(const silt_mesh *mesh, int *start, int *index) {
+    int at = 0;
+    for (int j = 0; j < mesh->n_node; j++) {
+        start[j] = at;
+        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
+            if (mesh->neighbour[k] >= j)
+                index[at++] = mesh->neighbour[k];
+    }
+    start[mesh->n_node] = at;
+}
+
 double silt_mesh_volume(const silt_mesh *mesh, const double *x) {
     const int n = mesh->n_cell;
     double part[CHUNK_MOST];
