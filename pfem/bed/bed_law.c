@@ -8,13 +8,61 @@ static double patch_full(const silt_bed *bed, const silt_patch *patch) {
     return patch->mass / bed->index->length[patch->node];
 }
 
-void silt_bed_excess(const silt_bed *bed, const silt_scene *scene, const silt_patch *patch, double *work, double *eroded) {
-    *work = *eroded = 0;
-    if (!(bed->index->length[patch->node] > 0))
+// ---------------------------------------------------------------- what a release leaves to the nodes around it
+
+static void heirs_add(silt_bed_heirs *heirs, const silt_bed *bed, int node) {
+    for (int k = 0; k < heirs->count; k++)
+        if (heirs->node[k] == node)
+            return;
+    SILT_RESERVE(heirs->node, heirs->node_capacity, heirs->count + 1);
+    SILT_RESERVE(heirs->length, heirs->length_capacity, heirs->count + 1);
+    heirs->node[heirs->count] = node;
+    heirs->length[heirs->count++] = bed->exposed[node] ? bed->index->length[node] : 0;
+}
+
+void silt_bed_heirs_take(silt_bed_heirs *heirs, const silt_bed *bed, const silt_scene *scene, const silt_patch *patch) {
+    *heirs = (silt_bed_heirs){0};
+    for (int k = 0; k < patch->n_cell; k++)
+        for (int a = 0; a < (int)(sizeof bed->cell[0] / sizeof bed->cell[0][0]); a++)
+            if (bed->cell[patch->cell[k]][a] >= 0)
+                heirs_add(heirs, bed, bed->cell[patch->cell[k]][a]);
+    const double length = bed->index->length[patch->node];
+    if (!(length > 0))
         return;
-    const double full = patch_full(bed, patch);
-    *work = silt_clamp(bed->work[patch->node] - scene->bed.work, 0, scene->bed.work);
-    *eroded = silt_clamp(bed->eroded[patch->node] - full, 0, full);
+    heirs->work_length = length;
+    heirs->work = length * silt_clamp(bed->work[patch->node] - scene->bed.work, 0, scene->bed.work);
+    // what its neighbours took out of the patch it has worn off as well: up to two patches
+    heirs->eroded = silt_clamp(length * bed->eroded[patch->node] - patch->mass, 0, 2 * patch->mass);
+}
+
+void silt_bed_heirs_give(silt_bed_heirs *heirs, silt_bed *bed) {
+    // the nodes that the release laid bare; where it laid none bare those around it
+    double fresh = 0, around = 0;
+    for (int k = 0; k < heirs->count; k++) {
+        const int i = heirs->node[k];
+        if (!bed->exposed[i])
+            continue;
+        *(heirs->length[k] > 0 ? &around : &fresh) += bed->index->length[i];
+    }
+    for (int k = 0; k < heirs->count; k++) {
+        const int i = heirs->node[k];
+        const double length = bed->index->length[i];
+        if (!bed->exposed[i]) {
+            // what no longer is the bed's surface forgets its work
+            bed->work[i] = bed->eroded[i] = bed->shear[i] = 0;
+        } else if (heirs->length[k] > 0) {
+            // the same mass is worn off a node whose surface changed
+            bed->eroded[i] *= heirs->length[k] / length;
+            bed->eroded[i] += fresh > 0 ? 0 : heirs->eroded / around;
+        } else {
+            bed->work[i] = heirs->work / silt_max(fresh, heirs->work_length);
+            bed->eroded[i] = heirs->eroded / fresh;
+            bed->shear[i] = 0;
+        }
+    }
+    free(heirs->node);
+    free(heirs->length);
+    *heirs = (silt_bed_heirs){0};
 }
 
 // ---------------------------------------------------------------- wear

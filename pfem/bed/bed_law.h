@@ -12,7 +12,18 @@ void silt_bed_wear(silt_bed *bed, const silt_scene *scene, const silt_nodes *nod
 /** Exposed nodes whose accumulator is full, fullest first: work >= W_c, with a layer eroded >= mass per exposed length of the
  * patch. Ask once a step: what that step's releases expose comes in the next. @return how many (at most capacity) */
 int silt_bed_due(const silt_bed *bed, const silt_scene *scene, int capacity, int *due);
-/** What the patch's node has beyond what its release takes, at most a layer: J/m3 of work and kg/m2 worn off; 0 when it is not exposed. */
-void silt_bed_excess(const silt_bed *bed, const silt_scene *scene, const silt_patch *patch, double *work, double *eroded);
+/** The nodes around a patch that is about to leave, and what its node has worn off beyond it */
+typedef struct silt_bed_heirs {
+    int count, node_capacity, length_capacity;
+    int *node;      // owned, all nodes of the patch
+    double *length; // owned, m, of surface before the release, 0: buried
+    double work, work_length; // J/m3 times m of surface
+    double eroded;            // kg/m
+} silt_bed_heirs;
+void silt_bed_heirs_take(silt_bed_heirs *heirs, const silt_bed *bed, const silt_scene *scene, const silt_patch *patch);
+/** After the patch has left: newly exposed nodes start with the excess, shared over their surface; where there are none those around
+ * take it. Nodes whose surface changed keep the mass that was worn off them, not the mass per area: over many releases the mass that
+ * leaves is the mass that was worn off. Empties heirs. */
+void silt_bed_heirs_give(silt_bed_heirs *heirs, silt_bed *bed);
 
 #endif
