@@ -200,6 +200,7 @@ typedef enum {
     DRAG_KOCH_HILL,
     DRAG_BEETSTRA,
 } silt_drag_law;
+typedef enum { LIFT_NONE = 0, LIFT_SAFFMAN } silt_lift_law;
 /** a grain that is there from the start */
 typedef struct silt_grain_def {
     double at[3], velocity[3];
@@ -226,6 +227,11 @@ typedef struct silt_grains_def {
     double parcel;        // m, diameter of the discrete elements that released bed becomes; required with a bed
     double width;         // m, accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel, or 5 d without bed
     double kernel;        // m, width of the porosity kernel; 0: max(3 d, 2 h)
+    double added_mass;    // 0, coefficient, of the displaced water's mass; spheres: 0.5
+    silt_lift_law lift;   // lift: none | saffman
+    bool viscous_force;   // V div tau, default false
+    bool rotational_drag; // torque on the spin, default false
+    bool fixed;           // the grains of the start are held where they are, default false
     int n_grain;
     silt_grain_def *grain; // owned; key `list`
     int n_fill;

@@ -39,6 +39,7 @@ static const silt_word drag_words[] = {
     {"di-felice", DRAG_DI_FELICE}, {"ergun", DRAG_ERGUN},       {"wen-yu", DRAG_WEN_YU},
     {"gidaspow", DRAG_GIDASPOW}, {"koch-hill", DRAG_KOCH_HILL}, {"beetstra", DRAG_BEETSTRA}, {0}};
 static const silt_word arrange_words[] = {{"random", ARRANGE_RANDOM}, {"lattice", ARRANGE_LATTICE}, {0}};
+static const silt_word lift_words[] = {{"none", LIFT_NONE}, {"saffman", LIFT_SAFFMAN}, {0}};
 static const silt_word shape_words[] = {
     {"box", SHAPE_BOX}, {"disc", SHAPE_DISC}, {"polygon", SHAPE_POLYGON}, {"temple", SHAPE_TEMPLE}, {0}};
 static const silt_word motion_words[] = {{"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {0}};
@@ -412,6 +413,15 @@ static const silt_key grains_rows[] = {
      .doc = "accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel; without a bed 0.91 d with regions (n = 0.4), else 5 d"},
     {"kernel", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, kernel),
      .doc = "width of the porosity kernel; 0: the larger of 3 d and 2 h"},
+    {"added_mass", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, added_mass),
+     .doc = "share of the displaced water that is accelerated along; spheres: 0.5"},
+    {"lift", KEY_WORD, .fallback = "none", .words = lift_words, AT(silt_grains_def, lift), .doc = "force across the water's shear"},
+    {"viscous_force", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, viscous_force),
+     .doc = "force of the water's viscous stress on the grain's volume"},
+    {"rotational_drag", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, rotational_drag),
+     .doc = "torque of the water on grains that spin otherwise than it does"},
+    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, fixed),
+     .doc = "grains that are there from the start stay where they are: a packed bed"},
     {"list", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &grain_table, MANY(silt_grains_def, n_grain, grain),
      .doc = "grains that are there from the start"},
     {"regions", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &fill_table, MANY(silt_grains_def, n_fill, fill),
