@@ -188,7 +188,18 @@ typedef struct silt_bed_def {
     silt_region *region; // owned
 } silt_bed_def;
 
-typedef enum { DRAG_NONE = 0, DRAG_SCHILLER_NAUMANN, DRAG_DI_FELICE } silt_drag_law;
+typedef enum {
+    DRAG_NONE = 0,
+    DRAG_SCHILLER_NAUMANN,
+    DRAG_DI_FELICE,
+    DRAG_STOKES,
+    DRAG_ABRAHAM,
+    DRAG_ERGUN,
+    DRAG_WEN_YU,
+    DRAG_GIDASPOW,
+    DRAG_KOCH_HILL,
+    DRAG_BEETSTRA,
+} silt_drag_law;
 /** a grain that is there from the start */
 typedef struct silt_grain_def {
     double at[3], velocity[3];
@@ -210,7 +221,7 @@ typedef struct silt_fill_def {
 } silt_fill_def;
 typedef struct silt_grains_def {
     bool on;              // true when the block is there; bodies alone need contact properties too: see contact
-    silt_drag_law drag;   // drag: none | schiller-naumann | di-felice
+    silt_drag_law drag;   // drag: none | stokes | schiller-naumann | ..., docs/grains.md
     double diameter;      // m, d50 of the bed's grains: default parcel
     double parcel;        // m, diameter of the discrete elements that released bed becomes; required with a bed
     double width;         // m, accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel, or 5 d without bed

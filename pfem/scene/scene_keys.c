@@ -35,7 +35,9 @@ static const silt_word near_words[] = {{"region", NEAR_REGION}, {"walls", NEAR_W
 static const silt_word axis_words[] = {{"none", 0}, {"x", 1}, {"y", 2}, {"z", 3}, {0}};
 static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, {"dissipation", BED_DISSIPATION}, {0}};
 static const silt_word drag_words[] = {
-    {"none", DRAG_NONE}, {"schiller-naumann", DRAG_SCHILLER_NAUMANN}, {"di-felice", DRAG_DI_FELICE}, {0}};
+    {"none", DRAG_NONE},       {"stokes", DRAG_STOKES},         {"schiller-naumann", DRAG_SCHILLER_NAUMANN}, {"abraham", DRAG_ABRAHAM},
+    {"di-felice", DRAG_DI_FELICE}, {"ergun", DRAG_ERGUN},       {"wen-yu", DRAG_WEN_YU},
+    {"gidaspow", DRAG_GIDASPOW}, {"koch-hill", DRAG_KOCH_HILL}, {"beetstra", DRAG_BEETSTRA}, {0}};
 static const silt_word arrange_words[] = {{"random", ARRANGE_RANDOM}, {"lattice", ARRANGE_LATTICE}, {0}};
 static const silt_word shape_words[] = {
     {"box", SHAPE_BOX}, {"disc", SHAPE_DISC}, {"polygon", SHAPE_POLYGON}, {"temple", SHAPE_TEMPLE}, {0}};
