@@ -350,6 +350,7 @@ struct silt_bed {
     double solid_mass;   // kg/m, sum of mass
     double initial_mass; // kg/m
     double pore_water;   // kg/m, released to the water since the start less taken up
+    double y_plus;       // of the first cell on the bed in the last step, the largest; 0: the law takes no gradient
     struct silt_bed_index *index; // owned, cells by node and by place (bed_mesh.h); every change keeps it up to date
 };
 

@@ -218,7 +218,7 @@ static void bed_step(silt_run *run) {
     const double dt = silt_max(run->dt - run->wear_ahead, 0);
     run->wear_ahead = silt_max(run->wear_ahead - run->dt, 0);
     if (run->scene->fluid.on && dt > 0)
-        silt_bed_wear(&run->bed, run->scene, &run->nodes, &run->mesh, &run->locator, dt);
+        silt_bed_wear(&run->bed, run->scene, &run->nodes, &run->mesh, &run->locator, NULL, dt);
     silt_run_release(run);
 }
 
