@@ -398,6 +398,7 @@ typedef struct silt_ledger {
     double inflow_mass, outflow_mass;             // water, cumulative, kg
     double pore_water_mass;                       // released less taken up, cumulative, kg
     double bed_mass, released_mass, deposited_mass, left_mass;      // sediment, cumulative, kg
+    double bed_shear, bed_work, bed_y_plus;       // Pa, J/m3, largest on the bed's surface; see bed.y_plus
     double initial_sediment;
     int grain_count;
     double grain_mass, sediment_error;
