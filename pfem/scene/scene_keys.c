@@ -33,7 +33,11 @@ static const silt_word rheology_words[] = {{"newtonian", RHEOLOGY_NEWTONIAN},
 static const silt_word near_words[] = {{"region", NEAR_REGION}, {"walls", NEAR_WALLS},     {"bed", NEAR_BED},
                                        {"bodies", NEAR_BODIES}, {"surface", NEAR_SURFACE}, {0}};
 static const silt_word axis_words[] = {{"none", 0}, {"x", 1}, {"y", 2}, {"z", 3}, {0}};
-static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, {"dissipation", BED_DISSIPATION}, {0}};
+static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, {"dissipation", BED_DISSIPATION},
+                                      {"power", BED_POWER}, {"excess-shear", BED_EXCESS_SHEAR},
+                                      {"shields", BED_SHIELDS}, {0}};
+static const silt_word shear_words[] = {{"default", SHEAR_DEFAULT}, {"paper", SHEAR_PAPER}, {"gradient", SHEAR_GRADIENT},
+                                        {"log-law", SHEAR_LOG_LAW}, {0}};
 static const silt_word drag_words[] = {
     {"none", DRAG_NONE},       {"stokes", DRAG_STOKES},         {"schiller-naumann", DRAG_SCHILLER_NAUMANN}, {"abraham", DRAG_ABRAHAM},
     {"di-felice", DRAG_DI_FELICE}, {"ergun", DRAG_ERGUN},       {"wen-yu", DRAG_WEN_YU},
@@ -350,18 +354,37 @@ TABLE(wall, "a wall", silt_wall, offsetof(silt_wall, form));
 static const silt_key bed_rows[] = {
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_bed_def, density), .doc = "of the grains' solid"},
     {"porosity", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_bed_def, porosity), .doc = "share of pores"},
+    {"law", KEY_WORD, .flags = KEY_SELECTOR, .fallback = "frictional-work", .words = law_words, AT(silt_bed_def, law),
+     .doc = "how fast the water wears the bed; see docs/bed.md"},
     {"work", KEY_NUMBER, .unit = "J/m3", .flags = KEY_OPEN_LOW | KEY_INFINITE, RANGE(0, HUGE_VAL),
-     AT(silt_bed_def, work), .doc = "frictional work that loosens the bed; .inf: never"},
-    {"law", KEY_WORD, .fallback = "frictional-work", .words = law_words, AT(silt_bed_def, law),
-     .doc = "how the water's work on the bed is found"},
+     AT(silt_bed_def, work), .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION) | ONLY(BED_POWER),
+     .doc = "W_c, frictional work that loosens the bed; .inf: never. A constant of law, mesh and water, not of the soil: at a rate of "
+            "E m/s under tau it is h_b tau^2/(viscosity E), h_b the patch height; power: (tau - threshold) u*/E"},
+    {"erodibility", KEY_NUMBER, .unit = "m3/(N s)", POSITIVE, AT(silt_bed_def, erodibility), .when = ONLY(BED_EXCESS_SHEAR),
+     .doc = "k_d of E = k_d (tau - threshold); Hanson and Simon: 2e-7 threshold^-0.5"},
+    {"critical_shields", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, critical), .when = ONLY(BED_SHIELDS),
+     .doc = "Shields number at which grains begin to move; 0: Soulsby and Whitehouse for grains.diameter"},
+    {"shear", KEY_WORD, .fallback = "default", .words = shear_words, AT(silt_bed_def, shear),
+     .doc = "stress on the bed: viscosity v/(2 distance), viscosity times the gradient at the bed, or the law of a rough wall; default: "
+            "paper for frictional-work, gradient for dissipation, log-law for the others"},
     {"distance", KEY_NUMBER, .unit = "m", .fallback = "=fluid.size", POSITIVE, AT(silt_bed_def, distance),
-     .doc = "where the law frictional-work samples the velocity, along the normal"},
+     .doc = "where shear: paper samples the velocity, along the normal"},
+    {"roughness", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, roughness),
+     .doc = "equivalent sand roughness of the bed, for log-law and for condition: wall-law; 0: 2.5 grains.diameter"},
     {"size", KEY_NUMBER, .unit = "m", .fallback = "=fluid.size", POSITIVE, AT(silt_bed_def, size),
      .doc = "distance between the bed's nodes"},
     {"layer", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, layer),
+     .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION),
      .doc = "thickness that one `work` removes; 0: the height of the patch"},
     {"threshold", KEY_NUMBER, .unit = "Pa", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, threshold),
-     .doc = "shear stress below which no work is done"},
+     .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION) | ONLY(BED_POWER) | ONLY(BED_EXCESS_SHEAR),
+     .doc = "shear stress below which nothing wears, on level ground"},
+    {"repose", KEY_NUMBER, .unit = "degrees", .fallback = "0", .low = 0, .high = 80, AT(silt_bed_def, repose),
+     .doc = "angle of repose: what stands steeper falls as grains; 0: it stands at any slope, but not upside down"},
+    {"slope", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, slope),
+     .doc = "with repose, the threshold falls downhill and rises uphill"},
+    {"cover", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, cover),
+     .doc = "the part of the bed that parcels lie on does not wear"},
     {"saturation", KEY_NUMBER, .fallback = "1", RANGE(0, 1), AT(silt_bed_def, saturation),
      .doc = "share of the pores that holds water"},
     {"deposition", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, deposition),
@@ -371,7 +394,7 @@ static const silt_key bed_rows[] = {
     {"regions", KEY_LIST, .sub = &region_table, MANY(silt_bed_def, n_region, region),
      .doc = "where bed is at the start"},
     {0}};
-TABLE(bed, "the bed block", silt_bed_def, -1);
+TABLE(bed, "the bed block", silt_bed_def, offsetof(silt_bed_def, law));
 
 static const silt_key grain_rows[] = {
     {"at", KEY_POINT, .unit = "m", AT(silt_grain_def, at), .doc = "centre"},
