@@ -15,7 +15,7 @@ static bool polygon_contains(int n, const double *p, double x, double y) {
     return in;
 }
 
-bool silt_barrier_contains(const silt_barrier *barrier, const double point[2]) {
+bool silt_barrier_contains(const silt_barrier *barrier, const double *point) {
     int segment;
     if (barrier->walls && barrier->walls->count && silt_walls_distance(barrier->walls, point, &segment) < 0)
         return true;

@@ -224,13 +224,22 @@ static void hand_on_landing(silt_run *run, const int *wall_before, const double 
     }
 }
 
+// a bed cell in the numbers of the nodes; false where one of its corners never was on the surface
+static bool water_cell(const silt_run *run, const int *bed_cell, int cell[4]) {
+    for (int a = 0; a < 4; a++) {
+        cell[a] = bed_cell[a] < 0 ? -1 : run->bed.fluid_node[bed_cell[a]];
+        if (bed_cell[a] >= 0 && cell[a] < 0)
+            return false;
+    }
+    return true;
+}
+
 // bed cells that became water, and water that became bed, in the numbers of the nodes
 static void remember_bed(silt_run *run) {
     silt_memory *memory = &run->memory;
-    const int *node = run->bed.fluid_node;
     for (int k = 0; k < run->n_freed; k++) {
-        const int cell[4] = {node[run->freed[k][0]], node[run->freed[k][1]], node[run->freed[k][2]], -1};
-        if (cell[0] < 0 || cell[1] < 0 || cell[2] < 0)
+        int cell[4];
+        if (!water_cell(run, run->freed[k], cell))
             continue;
         SILT_RESERVE(memory->cell, memory->cell_capacity, memory->n_cell + 1);
         SILT_RESERVE(memory->area, memory->area_capacity, memory->n_cell + 1);
@@ -238,8 +247,8 @@ static void remember_bed(silt_run *run) {
         memory->area[memory->n_cell++] = run->freed_area[k];
     }
     for (int k = 0; k < run->n_grown; k++) {
-        const int cell[4] = {node[run->grown[k][0]], node[run->grown[k][1]], node[run->grown[k][2]], -1};
-        if (cell[0] < 0 || cell[1] < 0 || cell[2] < 0)
+        int cell[4];
+        if (!water_cell(run, run->grown[k], cell))
             continue;
         SILT_RESERVE(memory->taken, memory->taken_capacity, memory->n_taken + 1);
         SILT_RESERVE(memory->taken_area, memory->taken_area_capacity, memory->n_taken + 1);
@@ -296,7 +305,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
 
     // from here on positions are mended: what that does to the volume is booked by the rebuild
     for (int i = 0; i < n; i++) {
-        if (nodes->kind[i] == NODE_BED && run->fluid.hold[i] == 1)
+        if (nodes->kind[i] == NODE_BED && run->fluid.hold[i] != HOLD_ALL)
             memcpy(nodes->x + D * i, run->x_old + D * i, (size_t)D * sizeof(double));
         if (!mesh->wet[i] && nodes->kind[i] == NODE_FLUID)
             fly(run, i);
