@@ -2,6 +2,8 @@
 
 #include "bed_mesh.h"
 
+#define HOLDS_SLACK 1e-11 // times the cube of a bin: six times the volume by which a place may lie outside of a cell in space
+
 // ---------------------------------------------------------------- walls
 
 static bool plane_on_wall(const silt_scene *scene, const double *p, const double *q) {
@@ -387,9 +389,10 @@ static bool cell_holds(const silt_bed *bed, int cell, const double *x) {
     const double *p = bed->x[node[0]], *q = bed->x[node[1]], *r = bed->x[node[2]];
     if (bed_dim(bed) == 2)
         return bed_cross(p, q, x) >= 0 && bed_cross(q, r, x) >= 0 && bed_cross(r, p, x) >= 0;
-    const double *s = bed->x[node[3]];
-    return bed_volume6(p, q, r, x) >= 0 && bed_volume6(p, s, q, x) >= 0 && bed_volume6(q, s, r, x) >= 0 &&
-           bed_volume6(p, r, s, x) >= 0;
+    // a place on a face of a tank is seldom in it to the last bit
+    const double *s = bed->x[node[3]], slack = -HOLDS_SLACK * bed->index->bin * bed->index->bin * bed->index->bin;
+    return bed_volume6(p, q, r, x) >= slack && bed_volume6(p, s, q, x) >= slack && bed_volume6(q, s, r, x) >= slack &&
+           bed_volume6(p, r, s, x) >= slack;
 }
 
 // bins that a box around x meets
