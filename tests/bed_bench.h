@@ -80,7 +80,7 @@ static inline void bench_wall(bench *b, int n, const double *xy) {
 
 static inline void bench_create(bench *b) {
     silt_error err = {0};
-    if (silt_bed_create(&b->bed, &b->scene, &err) != SILT_OK)
+    if (silt_bed_create(&b->bed, &b->scene, NULL, &err) != SILT_OK)
         fail_msg("%s", err.text);
 }
 

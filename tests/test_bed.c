@@ -49,9 +49,9 @@ static void test_create_box(void **state) {
             NEAR(n[0], 0, 1e-12);
             NEAR(n[1], 1, 1e-12);
         }
-    NEAR(silt_bed_level(&b.bed, 0.4321), 0.3, 1e-15);
-    NEAR(silt_bed_level(&b.bed, 0), 0.3, 1e-15);
-    assert_true(silt_bed_level(&b.bed, 1.01) == -HUGE_VAL);
+    NEAR(silt_bed_level(&b.bed, (double[]){0.4321}), 0.3, 1e-15);
+    NEAR(silt_bed_level(&b.bed, (double[]){0}), 0.3, 1e-15);
+    assert_true(silt_bed_level(&b.bed, (double[]){1.01}) == -HUGE_VAL);
     bench_close(&b);
 }
 
@@ -76,7 +76,7 @@ static void test_create_touching(void **state) {
     bench_polygon(&b, 3, (double[]){0.31, 0.2, 0.77, 0.2, 0.5, 0.41});
     check_created(&b, 0.2 + 0.5 * 0.46 * 0.21);
     NEAR(surface_length(&b.bed), 1 + 0.4 + 0.54 + hypot(0.19, 0.21) + hypot(0.27, 0.21), 1e-12);
-    NEAR(silt_bed_level(&b.bed, 0.5), 0.41, 1e-15);
+    NEAR(silt_bed_level(&b.bed, (double[]){0.5}), 0.41, 1e-15);
     bench_close(&b);
 
     // two that overlap are one: area of the union
@@ -96,7 +96,7 @@ static void test_create_touching(void **state) {
     // nothing there: refused with the scene's name and the key
     bench_open(&b, 0.04);
     silt_error err = {0};
-    assert_int_equal(silt_bed_create(&b.bed, &b.scene, &err), SILT_INPUT);
+    assert_int_equal(silt_bed_create(&b.bed, &b.scene, NULL, &err), SILT_INPUT);
     assert_non_null(strstr(err.text, "bench"));
     assert_non_null(strstr(err.text, "bed.regions"));
     bench_close(&b);
