@@ -401,14 +401,15 @@ int silt_series_column(const silt_series *series, const char *name); /**< column
 /** What silt_series_at needs: two columns or more, finite numbers, column 0 strictly rising. The error names file and line. */
 silt_status silt_series_rising(const silt_series *series, silt_error *err);
 
+/** m, k_s of the bed */
+static inline double silt_bed_roughness(const silt_scene *s) {
+    return s->bed.roughness > 0 ? s->bed.roughness : 2.5 * s->grains.diameter;
+}
+
 /** all grains that are there at the start: the list's, then the regions' */
 static inline int silt_scene_grains(const silt_scene *s) { return s->grains.n_grain + s->grains.n_filled; }
 static inline const silt_grain_def *silt_scene_grain(const silt_scene *s, int i) {
     return i < s->grains.n_grain ? &s->grains.grain[i] : &s->grains.filled[i - s->grains.n_grain];
-}
-/** m, k_s of the bed */
-static inline double silt_bed_roughness(const silt_scene *s) {
-    return s->bed.roughness > 0 ? s->bed.roughness : 2.5 * s->grains.diameter;
 }
 
 /** what a scene needs */
