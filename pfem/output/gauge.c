@@ -15,6 +15,7 @@ struct silt_gauges {
     double (*span)[2]; // owned, one per cell: part of a section in the cell
     int *span_cell;    // owned
     int main;          // lowest node of the largest group, -1
+    silt_heap heap;    // of grains
 };
 
 silt_status silt_gauges_create(silt_gauges **gauges, const silt_view *start, silt_error *err) {
@@ -39,6 +40,7 @@ void silt_gauges_free(silt_gauges **gauges) {
     free(g->volume);
     free(g->span);
     free(g->span_cell);
+    silt_heap_clear(&g->heap);
     free(g);
     *gauges = NULL;
 }
@@ -537,7 +539,7 @@ static void gauge_water(silt_gauges *g, const silt_view *view, const silt_gauge_
 }
 
 void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value) {
-    bool water = view->nodes && view->mesh && view->locator, connected = false;
+    bool water = view->nodes && view->mesh && view->locator, connected = false, heap = false;
     for (int i = 0; i < gauges->n_gauge; i++) {
         const silt_gauge_def *def = &view->scene->gauge[i];
         int n = silt_gauge_columns(view->scene, i);
@@ -547,6 +549,11 @@ void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value)
             double level = view->bed ? silt_bed_level(view->bed, def->from) : -HUGE_VAL;
             if (level > -HUGE_VAL)
                 value[0] = def->kind == GAUGE_SCOUR ? gauges->start[i] - level : level;
+        } else if (def->kind == GAUGE_GRAIN_FRONT || def->kind == GAUGE_GRAIN_HEIGHT || def->kind == GAUGE_GRAIN_SLOPE) {
+            if (!heap)
+                silt_heap_find(&gauges->heap, view);
+            heap = true;
+            value[0] = silt_heap_gauge(&gauges->heap, view, def);
         } else if (water) {
             if (!connected && (def->kind == GAUGE_FRONT || def->kind == GAUGE_HEIGHT || def->kind == GAUGE_EXTENT)) {
                 gauge_connect(gauges, view);

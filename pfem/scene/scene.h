@@ -299,6 +299,9 @@ typedef enum {
     GAUGE_FORCE,      // force_on: I: force of the water on wall I of the scene: columns NAME_x, NAME_y, NAME_z
     GAUGE_ANGULAR,    // angular_momentum_about: [x, y]; in 3-D columns NAME_x, NAME_y, NAME_z
     GAUGE_CENTROID,   // centroid_of: water: columns NAME_x, NAME_y, NAME_z
+    GAUGE_GRAIN_FRONT,  // grains_front: x | -x: the foremost x of the grains that hang together
+    GAUGE_GRAIN_HEIGHT, // grains_height_at: X (3-D: [x, y]): their top above that place
+    GAUGE_GRAIN_SLOPE,  // grains_slope: [x0, x1]: degrees by which it falls to the right, from x0 = from[0] to x1 = from[1]
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
 } silt_gauge_kind;
 typedef struct silt_gauge_def {
