@@ -6,6 +6,7 @@ static const double parcel_least = 0.4, parcel_most = 2.0; // radii of parcels i
 static const double parcel_usual = 0.75;                   // radius that the time step is chosen for
 static const double clump_spacing = 0.3;                   // between a body's spheres, times their radius
 static const double room_overlap = 0.01;                   // of the radius
+static const double heap_porosity = 0.4;                   // of what fills the regions, when it has settled
 static const double period_share = 3.2;                    // slab thickness over the largest sphere's diameter
 
 static void coupling_close(silt_coupling **coupling);
@@ -71,10 +72,13 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     const silt_scene *scene = c->scene;
     const silt_contact_def *contact = &scene->contact;
     const silt_grains_def *grains = &scene->grains;
-    double largest = 0.0, smallest = HUGE_VAL, clump = 0.0, listed = 0.0;
-    for (int i = 0; i < grains->n_grain; i++) {
-        listed = silt_max(listed, grains->grain[i].diameter);
-        smallest = silt_min(smallest, grains->grain[i].diameter / 2.0);
+    double largest = 0.0, smallest = HUGE_VAL, clump = 0.0, listed = 0.0, squares = 0.0, cubes = 0.0;
+    for (int i = 0; i < silt_scene_grains(scene); i++) {
+        const double d = silt_scene_grain(scene, i)->diameter;
+        listed = silt_max(listed, d);
+        smallest = silt_min(smallest, d / 2.0);
+        squares += d * d;
+        cubes += d * d * d;
     }
     largest = listed / 2.0;
     for (int i = 0; i < scene->n_body; i++) {
@@ -98,15 +102,18 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     if (!(c->width > 0.0)) {
         if (c->parcel > 0.0)
             c->width = 2.0 / 3.0 * 0.82 * 2.0 * c->parcel / (1.0 - scene->bed.porosity);
+        else if (grains->n_filled > 0)
+            c->width = 2.0 / 3.0 * 0.82 * cubes / squares / (1.0 - heap_porosity);
         else
             c->width = listed > 0.0 ? 5.0 * listed : 2.0 * largest;
     }
 
     // the stiffest sphere sets the time step; a body's spheres share its mass
     double rayleigh = HUGE_VAL;
-    for (int i = 0; i < grains->n_grain; i++)
-        rayleigh =
-            silt_min(rayleigh, coupling_rayleigh(contact, grains->grain[i].diameter / 2.0, grains->grain[i].density));
+    for (int i = 0; i < silt_scene_grains(scene); i++) {
+        const silt_grain_def *g = silt_scene_grain(scene, i);
+        rayleigh = silt_min(rayleigh, coupling_rayleigh(contact, g->diameter / 2.0, g->density));
+    }
     if (c->parcel > 0.0)
         rayleigh = silt_min(rayleigh, coupling_rayleigh(contact, parcel_usual * c->parcel, scene->bed.density));
     for (int i = 0; i < scene->n_body; i++) {
@@ -127,11 +134,8 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     c->exchange.density = scene->fluid.density;
     c->exchange.viscosity = scene->fluid.viscosity;
     c->exchange.refresh = true;
-    c->exchange.force.def = (silt_force_def){.added_mass = grains->added_mass,
-                                             .theta = scene->fluid.theta,
-                                             .viscous = grains->viscous_force,
-                                             .lift = grains->lift == LIFT_SAFFMAN,
-                                             .spin = grains->rotational_drag};
+    c->exchange.force.def = (silt_force_def){grains->added_mass, scene->fluid.theta, grains->viscous_force,
+                                             grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     for (int k = 0; k < 2; k++)
         c->exchange.gravity[k] = scene->gravity[k];
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
@@ -664,8 +668,8 @@ static silt_status coupling_recover(silt_coupling *c, silt_error *err) {
 }
 
 static void coupling_listed(silt_coupling *c) {
-    for (int i = 0; i < c->scene->grains.n_grain; i++) {
-        const silt_grain_def *def = &c->scene->grains.grain[i];
+    for (int i = 0; i < silt_scene_grains(c->scene); i++) {
+        const silt_grain_def *def = silt_scene_grain(c->scene, i);
         coupling_grain *g = coupling_append(c, def->at, def->velocity, def->diameter / 2.0);
         g->solid = M_PI / 6.0 * def->diameter * def->diameter * def->diameter / c->width;
         g->mass = def->density * g->solid;

@@ -87,7 +87,7 @@ struct silt_coupling {
 
 /** grains.fixed holds the grain with this id: it is one of those of the start, which come first */
 static inline bool coupling_fixes(const silt_coupling *c, int64_t id) {
-    return c->scene->grains.fixed && id <= c->scene->grains.n_grain;
+    return c->scene->grains.fixed && id <= silt_scene_grains(c->scene);
 }
 
 /** mass of the sphere over the mass that it stands for in the slab: 1, more for a crumb; forces on it are scaled alike, so that it

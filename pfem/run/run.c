@@ -2,6 +2,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include "bed_law.h"
 #include "parallel.h"
 #include "run.h"
 

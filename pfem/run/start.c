@@ -64,8 +64,8 @@ void silt_run_box(silt_run *run) {
         box_span(lo, hi, run->nodes.x + D * i, D, 0);
     for (int b = 0; b < scene->n_body; b++)
         box_span(lo, hi, scene->body[b].at, D, silt_max(scene->body[b].scale, scene->body[b].height));
-    for (int k = 0; k < scene->grains.n_grain; k++)
-        box_span(lo, hi, scene->grains.grain[k].at, D, scene->grains.grain[k].diameter);
+    for (int k = 0; k < silt_scene_grains(scene); k++)
+        box_span(lo, hi, silt_scene_grain(scene, k)->at, D, silt_scene_grain(scene, k)->diameter);
     // nothing holds water that has no walls: it may go far
     double margin = 0;
     for (int d = 0; d < D; d++)
