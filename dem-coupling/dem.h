@@ -81,7 +81,7 @@ silt_status silt_dem_add_body(silt_dem *dem, const silt_dem_body *body, silt_err
  * springs) of the contacts out of its first half substep; see silt_dem_keep. */
 silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const double *body_force,
                            const double *body_torque, silt_error *err);
-/** Torques on the grains in the next run, 3 per grain in the order of the last state, N m; copied */
+/** Torques on the grains in the next run, 3 per grain in the order of the last state, N m; borrowed until then */
 void silt_dem_twist(silt_dem *dem, const double *torque);
 /** The next run may go on from where the last one ended, with its neighbour lists and without a set-up. A run is set up all the
  * same when there are edits or free bodies, and after a save or load. How the lists came about decides the order of sums: the

@@ -286,6 +286,7 @@ typedef enum {
     GAUGE_FORCE,      // force_on: I: force of the water on wall I of the scene: columns NAME_x, NAME_y, NAME_z
     GAUGE_ANGULAR,    // angular_momentum_about: [x, y]; in 3-D columns NAME_x, NAME_y, NAME_z
     GAUGE_CENTROID,   // centroid_of: water: columns NAME_x, NAME_y, NAME_z
+    GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
 } silt_gauge_kind;
 typedef struct silt_gauge_def {
