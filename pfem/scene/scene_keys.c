@@ -522,6 +522,8 @@ static const silt_key gauge_rows[] = {
      .doc = "of the water about this point, kg m2/s; in three dimensions columns NAME_x, NAME_y, NAME_z"},
     {"centroid_of", KEY_SIGN, .flags = KEY_CHOICE, .words = water_words, .select = GAUGE_CENTROID,
      AT(silt_gauge_def, from), .doc = "centre of mass of the water, columns NAME_x, NAME_y, NAME_z, m"},
+    {"grains_in", KEY_BOX, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_GRAINS, AT(silt_gauge_def, from),
+     .doc = "of the grains in this box: mean velocity by mass, columns NAME_x, NAME_y, NAME_z, m/s, and their mass, NAME_m, kg (2-D: per metre of width)"},
     {0}};
 TABLE(gauge, "a gauge", silt_gauge_def, offsetof(silt_gauge_def, kind));
 
