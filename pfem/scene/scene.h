@@ -171,6 +171,7 @@ typedef struct silt_fluid_def {
 } silt_fluid_def;
 
 typedef enum { BED_FRICTIONAL_WORK = 0, BED_DISSIPATION } silt_bed_law;
+typedef enum { SEEPAGE_NONE = 0, SEEPAGE_DARCY, SEEPAGE_KOZENY_CARMAN } silt_seepage;
 typedef struct silt_bed_def {
     bool on;
     double density;   // kg/m3 of the grains' solid, required
@@ -182,6 +183,9 @@ typedef struct silt_bed_def {
     double layer;     // m, layer thickness h_0 that one W_c removes; 0: the patch height
     double threshold; // Pa, shear stress below which no work is done; default 0
     double saturation; // share of the pores that holds water, default 1
+    silt_seepage seepage; // seepage: none | darcy | kozeny-carman
+    double permeability;  // m2, with seepage: darcy
+    bool fluidise;     // seepage that outweighs the grains lifts them off the surface, default true
     bool deposition;   // default true
     silt_condition condition; // of water on the bed, default no-slip
     int n_region;
