@@ -331,8 +331,7 @@ static int star_continuity(silt_fluid *f, const silt_step *s, const double *p) {
     return worst_residual(f, s);
 }
 
-// v += P G q / inertia
-static void correct(silt_fluid *f, const silt_step *s, const double *q, double *v) {
+void silt_fluid_correct(silt_fluid *f, const silt_step *s, const double *q, double *v) {
     const int D = f->dim;
     memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
     silt_assemble_pressure(f, s->mesh, q, f->scratch);
@@ -349,14 +348,18 @@ static void correct(silt_fluid *f, const silt_step *s, const double *q, double *
     }
 }
 
-// increment = -matrix^-1 residual, in 3-D to `tolerance`, or to what is worth having where the step is solved far
-static silt_status pressure_increment(silt_fluid *f, const silt_step *s, double tolerance, silt_error *err) {
+// increment = -matrix^-1 residual, in 3-D to `tolerance`, or to what is worth having where the step is solved far; seeps: it is a
+// pressure, which the bed answers, not an impulse or the way that debts are paid
+static silt_status pressure_increment(silt_fluid *f, const silt_step *s, bool seeps, double tolerance, silt_error *err) {
     silt_status status;
     SILT_PARALLEL(f->n_node)
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
     tolerance = silt_min(tolerance, FLUID_INNER * s->scene->fluid.tolerance);
-    SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, f->residual, tolerance, f->increment, err));
+    if (seeps && f->seep)
+        SILT_CLOCKED(solve, status = silt_seepage_solve(f, s, f->residual, tolerance, f->increment, err));
+    else
+        SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, f->residual, tolerance, f->increment, err));
     return status;
 }
 
@@ -382,8 +385,8 @@ static silt_status project_start(silt_fluid *f, const silt_step *s, const double
     const double before = kinetic_energy(f, s, v);
     // once: what is left is the smoothing's, and more of it makes the pressure rougher
     silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
-    SILT_TRY(pressure_increment(f, s, 1e-2, err));
-    correct(f, s, f->increment, v);
+    SILT_TRY(pressure_increment(f, s, false, 1e-2, err));
+    silt_fluid_correct(f, s, f->increment, v);
     f->projected = before - kinetic_energy(f, s, v);
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i])
@@ -405,8 +408,8 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
             silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
         for (int i = 0; i < f->n_node; i++)
             f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
-        SILT_TRY(pressure_increment(f, s, 0.03, err));
-        correct(f, s, f->increment, f->shift);
+        SILT_TRY(pressure_increment(f, s, false, 0.03, err));
+        silt_fluid_correct(f, s, f->increment, f->shift);
     }
     return SILT_OK;
 }
@@ -689,9 +692,9 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         if (whole)
             SILT_TRY(correct_whole(f, s, err));
         else
-            SILT_TRY(pressure_increment(f, s, 0.01, err));
+            SILT_TRY(pressure_increment(f, s, true, 0.01, err));
         if (!whole)
-            correct(f, s, f->increment, f->w);
+            silt_fluid_correct(f, s, f->increment, f->w);
         if (!direct && (split || stiff > FLUID_STIFF)) {
             SILT_TRY(prepare_stiff(f, s, &twofold, err)); // viscosity may have grown since the first iteration
             SILT_TRY(correct_stiff(f, err));
@@ -712,6 +715,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     fluid_reserve(f, s);
     silt_parts_make(&f->parts, s->mesh);
     const int D = f->dim;
+    f->seep = s->seep && s->seep->n_water ? s->seep : NULL;
     if (!f->pressure)
         f->pressure = silt_pressure_create();
     f->theta = def->theta;
