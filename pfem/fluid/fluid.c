@@ -607,6 +607,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             if (def->scheme == SCHEME_FRACTIONAL)
                 SILT_TRY(explicit_limit(f, s, err));
             silt_mobile_find(f, s->mesh, p);
+            silt_spray_find(f, s, p);
             // in the plane a stiff cell here and there is no reason
             whole = direct && mean_stiffness(f, s) > FLUID_WHOLE;
             split = !direct && stiffness(f, s) > FLUID_STIFF;
@@ -757,10 +758,11 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         for (int i = 0; i < f->n_node; i++) {
             nodes->p[i] = p[i];
             f->solved_volume += f->residual[i] * s->dt;
-            nodes->debt[i] -= (f->rate[i] + (f->mobile[i] != 1 ? f->withheld[i] : 0)) * s->dt;
+            const double answered = (f->rate[i] + (f->mobile[i] != 1 ? f->withheld[i] : 0)) * s->dt;
+            nodes->debt[i] -= answered;
             if (def->pressure == PRESSURE_LAPLACIAN && s->mesh->surface[i]) // no continuity there: what the node gained
                 nodes->debt[i] -= f->residual[i] * s->dt;
-            f->given_back += f->rate[i] * s->dt;
+            f->given_back += answered;
             if (!s->mesh->wet[i])
                 continue;
             // what is held keeps its velocity, the rest goes on to the end of the step
