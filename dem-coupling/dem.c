@@ -57,6 +57,19 @@ bool silt_dem_own_fault(const silt_dem *dem) {
     return !dem->link.failed || dem->link.gave_up;
 }
 
+// a place as it stands in messages
+typedef struct dem_text {
+    char text[96];
+} dem_text;
+static dem_text dem_place(const silt_dem *dem, const double *x) {
+    dem_text place;
+    if (dem->def.dim == 3)
+        snprintf(place.text, sizeof place.text, "(%g, %g, %g)", x[0], x[1], x[2]);
+    else
+        snprintf(place.text, sizeof place.text, "(%g, %g)", x[0], x[1]);
+    return place;
+}
+
 static bool dem_finite(int n, const double *value) {
     for (int i = 0; i < n; i++)
         if (!isfinite(value[i]))
@@ -73,25 +86,9 @@ void silt_dem_close(silt_dem **dem) {
     dem_link_close(&d->link);
     for (int k = 0; k < d->n_solid; k++)
         free((void *)d->solid[k].def.sphere);
-    void *owned[] = {(void *)d->def.worker,
-                     (void *)d->def.log,
-                     (void *)d->def.wall,
-                     d->live,
-                     d->remove,
-                     d->add,
-                     d->solid,
-                     d->id,
-                     d->x,
-                     d->v,
-                     d->omega,
-                     d->radius,
-                     d->mass,
-                     d->contacts,
-                     d->on_bed,
-                     d->body_x,
-                     d->body_v,
-                     d->body_omega,
-                     d->body_q};
+    void *owned[] = {(void *)d->def.worker, (void *)d->def.log, (void *)d->def.wall, (void *)d->def.triangle, d->live, d->remove, d->add,
+                     d->solid, d->id, d->x, d->v, d->omega, d->radius, d->mass, d->contacts, d->on_bed, d->body_x, d->body_v,
+                     d->body_omega, d->body_q};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
     free(d);
@@ -99,21 +96,15 @@ void silt_dem_close(silt_dem **dem) {
 }
 
 static silt_status dem_check(const silt_dem_def *def, silt_error *err) {
-    const double number[] = {def->lo[0],
-                             def->lo[1],
-                             def->hi[0],
-                             def->hi[1],
-                             def->gravity[0],
-                             def->gravity[1],
-                             def->rolling_friction,
-                             def->friction,
-                             def->body_friction};
-    const double positive[] = {def->hi[0] - def->lo[0], def->hi[1] - def->lo[1], def->period,
+    const bool space = def->dim == 3;
+    const double number[] = {def->lo[0],      def->lo[1],      def->lo[2],      def->hi[0],            def->hi[1],    def->hi[2],
+                             def->gravity[0], def->gravity[1], def->gravity[2], def->rolling_friction, def->friction, def->body_friction};
+    const double positive[] = {def->hi[0] - def->lo[0], def->hi[1] - def->lo[1], space ? def->hi[2] - def->lo[2] : def->period,
                                def->youngs_modulus,     def->restitution,        def->step,
                                def->min_radius,         def->max_radius};
-    static const char *const name[] = {"box width",   "box height", "period",          "Young's modulus",
-                                       "restitution", "time step",  "smallest radius", "largest radius"};
-    if (!dem_finite(9, number))
+    const char *const name[] = {"box width",   "box height", space ? "third extent of the box" : "period", "Young's modulus",
+                                "restitution", "time step",  "smallest radius",                            "largest radius"};
+    if (!dem_finite(12, number))
         return silt_fail(err, SILT_FAILED, "discrete elements: the box, gravity or a friction is not a finite number");
     for (int k = 0; k < 8; k++)
         if (!(positive[k] > 0) || !isfinite(positive[k]))
@@ -122,13 +113,16 @@ static silt_status dem_check(const silt_dem_def *def, silt_error *err) {
     if (def->restitution < 0.05 || def->restitution > 1)
         return silt_fail(err, SILT_FAILED, "discrete elements: the restitution is %g, LIGGGHTS allows 0.05 to 1",
                          def->restitution);
-    if (def->period < 6 * def->max_radius * (1 - 1e-12))
+    if (!space && def->period < 6 * def->max_radius * (1 - 1e-12))
         return silt_fail(err, SILT_FAILED,
                          "discrete elements: the period %g m must be at least 3 diameters of the largest sphere, %g m",
                          def->period, 6 * def->max_radius);
     for (int k = 0; k < def->n_wall; k++)
         if (!dem_finite(4, def->wall[k]))
             return silt_fail(err, SILT_FAILED, "discrete elements: wall %d is not finite", k);
+    for (int k = 0; k < def->n_triangle; k++)
+        if (!dem_finite(10, def->triangle[k]))
+            return silt_fail(err, SILT_FAILED, "discrete elements: triangle %d of the walls is not finite", k);
     return SILT_OK;
 }
 
@@ -144,6 +138,10 @@ static silt_status dem_create(silt_dem **dem, const silt_dem_def *def, bool appe
     if (def->n_wall)
         memcpy(wall, def->wall, (size_t)def->n_wall * sizeof *wall);
     d->def.wall = (const double(*)[4])wall;
+    double(*triangle)[10] = silt_alloc((size_t)def->n_triangle + 1, sizeof *triangle);
+    if (def->n_triangle)
+        memcpy(triangle, def->triangle, (size_t)def->n_triangle * sizeof *triangle);
+    d->def.triangle = (const double(*)[10])triangle;
     d->last_id = INT64_MIN;
     d->next_tag = 1;
     silt_status status = dem_link_open(&d->link, d->def.worker, d->def.log, append, err);
@@ -163,6 +161,8 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     memcpy(s->lo, def->lo, sizeof s->lo);
     memcpy(s->hi, def->hi, sizeof s->hi);
     memcpy(s->gravity, def->gravity, sizeof s->gravity);
+    s->dim = def->dim == 3 ? 3 : 2;
+    s->periodic = def->periodic;
     s->period = def->period;
     s->youngs_modulus = def->youngs_modulus;
     s->poissons_ratio = def->poissons_ratio;
@@ -174,6 +174,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->max_radius = def->max_radius;
     s->min_radius = def->min_radius;
     s->n_wall = def->n_wall;
+    s->n_triangle = def->n_triangle;
     s->no_contacts = def->no_contacts;
     s->n_body = bodies ? dem->n_free : 0;
     s->n_body_sphere = bodies ? dem->n_free_sphere : 0;
@@ -182,6 +183,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
     memcpy(DEM_SECTION(s, double, wall), def->wall, (size_t)def->n_wall * sizeof *def->wall);
+    memcpy(DEM_SECTION(s, double, triangle), def->triangle, (size_t)def->n_triangle * sizeof *def->triangle);
     double *sphere = DEM_SECTION(s, double, body_sphere);
     int first = 0;
     for (int k = 0; bodies && k < dem->n_solid; k++) {
@@ -351,8 +353,8 @@ static silt_status dem_take(silt_dem *dem, silt_error *err) {
             const dem_grain *g = &grain[row];
             if (!dem_finite(3, g->x) || !dem_finite(3, g->v) || !dem_finite(3, g->omega)) {
                 return dem_link_give_up(&dem->link, err,
-                                        "grain %lld is not finite after the run: x (%g, %g), v (%g, %g)",
-                                        (long long)live->id, g->x[0], g->x[1], g->v[0], g->v[1]);
+                                        "grain %lld is not finite after the run: x %s, v %s", (long long)live->id,
+                                        dem_place(dem, g->x).text, dem_place(dem, g->v).text);
             }
             dem->id[row] = live->id;
             memcpy(&dem->x[3 * row], g->x, sizeof g->x);
@@ -412,17 +414,20 @@ static silt_status dem_check_add(const silt_dem *dem, silt_error *err) {
             return silt_fail(err, SILT_FAILED,
                              "sphere %lld was added after sphere %lld; ids must rise and are used once", id,
                              (long long)last);
-        if (!dem_finite(2, a->x) || !dem_finite(2, a->v) || !isfinite(a->omega[2]))
-            return silt_fail(err, SILT_FAILED, "sphere %lld is not finite: x (%g, %g), v (%g, %g), omega %g", id,
-                             a->x[0], a->x[1], a->v[0], a->v[1], a->omega[2]);
+        if (!dem_finite(3, a->x) || !dem_finite(3, a->v) || !dem_finite(3, a->omega))
+            return silt_fail(err, SILT_FAILED, "sphere %lld is not finite: x %s, v %s, omega (%g, %g, %g)", id,
+                             dem_place(dem, a->x).text, dem_place(dem, a->v).text, a->omega[0], a->omega[1], a->omega[2]);
         if (!(a->radius > 0) || a->radius > def->max_radius * (1 + 1e-12) || !(a->density > 0) || !isfinite(a->density))
             return silt_fail(
                 err, SILT_FAILED,
                 "sphere %lld has radius %g m and density %g kg/m3; the radius must be above 0 and at most %g m", id,
                 a->radius, a->density, def->max_radius);
-        if (a->x[0] < def->lo[0] || a->x[0] >= def->hi[0] || a->x[1] < def->lo[1] || a->x[1] >= def->hi[1])
-            return silt_fail(err, SILT_FAILED, "sphere %lld at (%g, %g) lies outside the box (%g, %g) to (%g, %g)", id,
-                             a->x[0], a->x[1], def->lo[0], def->lo[1], def->hi[0], def->hi[1]);
+        bool outside = false;
+        for (int d = 0; d < (def->dim == 3 ? 3 : 2); d++)
+            outside |= a->x[d] < def->lo[d] || a->x[d] >= def->hi[d];
+        if (outside)
+            return silt_fail(err, SILT_FAILED, "sphere %lld at %s lies outside the box %s to %s", id, dem_place(dem, a->x).text,
+                             dem_place(dem, def->lo).text, dem_place(dem, def->hi).text);
         last = a->id;
     }
     return SILT_OK;
@@ -432,8 +437,8 @@ static silt_status dem_check_load(const silt_dem *dem, const double *force, cons
                                   const double *body_torque, silt_error *err) {
     for (int k = 0; force && k < dem->state.n_grain; k++)
         if (!dem_finite(3, &force[3 * k]))
-            return silt_fail(err, SILT_FAILED, "the force on grain %lld at (%g, %g) is not finite: (%g, %g)",
-                             (long long)dem->id[k], dem->x[3 * k], dem->x[3 * k + 1], force[3 * k], force[3 * k + 1]);
+            return silt_fail(err, SILT_FAILED, "the force on grain %lld at %s is not finite: %s", (long long)dem->id[k],
+                             dem_place(dem, &dem->x[3 * k]).text, dem_place(dem, &force[3 * k]).text);
     for (int k = 0; k < dem->n_solid; k++)
         if ((body_force && !dem_finite(3, &body_force[3 * k])) || (body_torque && !dem_finite(3, &body_torque[3 * k])))
             return silt_fail(err, SILT_FAILED, "the force or torque on rigid body %d at (%g, %g) is not finite", k,

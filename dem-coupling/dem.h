@@ -1,7 +1,7 @@
 /** @file dem.h
  * The discrete elements: a worker process (silt-dem) that links LIGGGHTS, driven through shared memory, one instruction
- * a coupling step. This side never loads LIGGGHTS, MPI or VTK. Everything is three-dimensional inside (a slab, periodic
- * in z, all z = 0 in 2-D): masses and forces in this header are of the real spheres (kg, N), not per metre of width.
+ * a coupling step. This side never loads LIGGGHTS, MPI or VTK. Everything is three-dimensional inside (in 2-D a slab, periodic
+ * in z, all z = 0): masses and forces in this header are of the real spheres (kg, N), not per metre of width.
  */
 #ifndef SILT_DEM_H
 #define SILT_DEM_H
@@ -15,14 +15,18 @@ typedef struct silt_dem_def {
     const char *worker;  // path of silt-dem
     const char *log;     // file that LIGGGHTS writes to (its screen), e.g. OUT/dem.log
     bool append;         // to what stands in it
-    double lo[2], hi[2]; // the box in x and y; a sphere that leaves it is gone
-    double period;       // m, periodic length in z (at least 3 times the largest sphere's diameter)
+    int dim;             // 3: space; 2 or 0: the slab
+    double lo[3], hi[3]; // the box (slab: in x and y); a sphere that leaves it is gone
+    bool periodic;       // in x: what leaves the box there comes in at the other end
+    double period;       // m, slab: periodic length in z (at least 3 times the largest sphere's diameter)
     double gravity[3];
     double youngs_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
     double step; // s, DEM time step, fixed for the run
     int n_wall;
     const double (
         *wall)[4];     // from_x, from_y, to_x, to_y: straight walls, infinitely deep in z, contact from both sides
+    int n_triangle;
+    const double (*triangle)[10]; // space: corners, then bits of the edges (1: from the first corner) that no other triangle joins
     double max_radius; // m, largest sphere that will ever come (neighbour cut-off)
     double min_radius;
     bool no_contacts; // contacts and on_bed of the state are not asked for (ten thousand grains: 0.4 ms a run)

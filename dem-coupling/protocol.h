@@ -50,12 +50,13 @@ typedef struct dem_body {
 typedef struct dem_shared {
     uint64_t size; // bytes of the memory file; the worker maps again when it grew
     // the numbers of silt_dem_def
-    double lo[2], hi[2], period, gravity[2];
+    int dim, periodic;
+    double lo[3], hi[3], period, gravity[3];
     double youngs_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
     double step, max_radius, min_radius;
     int resume, no_contacts;
     // lengths of the sections
-    int n_wall, n_body, n_body_sphere, n_remove, n_add, n_force, max_grain;
+    int n_wall, n_triangle, n_body, n_body_sphere, n_remove, n_add, n_force, max_grain;
     int n_step;
     int keep; // 1: this run may go on from the last one's end
     // answer
@@ -64,7 +65,8 @@ typedef struct dem_shared {
     double cpu_all;      // CPU time since the last answer
     char text[1024]; // why the worker gave up, or empty
     // sections, bytes from the start
-    uint64_t wall;        // 4 double per wall
+    uint64_t wall;        // plane: 4 double per wall
+    uint64_t triangle;    // space: 10 double per triangle of a wall
     uint64_t body;        // dem_body
     uint64_t body_sphere; // 3 double: x, y from the centroid, radius
     uint64_t remove;      // int: tags
@@ -81,6 +83,7 @@ static inline uint64_t dem_shared_layout(dem_shared *s) {
     uint64_t end = (sizeof *s + 63) & ~(uint64_t)63;
 #define DEM_PLACE(name, count, type) (s->name = end, end += ((uint64_t)(count) * sizeof(type) + 63) & ~(uint64_t)63)
     DEM_PLACE(wall, 4 * s->n_wall, double);
+    DEM_PLACE(triangle, 10 * s->n_triangle, double);
     DEM_PLACE(body, s->n_body, dem_body);
     DEM_PLACE(body_sphere, 3 * s->n_body_sphere, double);
     DEM_PLACE(remove, s->n_remove, int);

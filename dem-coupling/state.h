@@ -17,9 +17,9 @@ typedef struct coupling_grain {
     double x[3], v[3], omega[3];
     double radius, mass, solid; // m, kg/m, m3/m
     double diameter, number;    // for drag: m, grains per metre of width
-    double force[2];            // N/m, the water's
-    double contact[2], net;     // N/m, of the last step
-    double old_x[2], old_v[2];  // before the substeps
+    double force[3];            // N/m, the water's
+    double contact[3], net;     // N/m, of the last step
+    double old_x[3], old_v[3];  // before the substeps
     int contacts;
     int near; // a node of the water next to it when it was last located, -1: none
     uint8_t on_bed;
@@ -49,8 +49,10 @@ struct silt_coupling {
     const silt_walls *walls; // borrowed
     silt_dem *dem;           // owned
     silt_dem_def dem_def;    // what it was opened with; its strings are borrowed
-    double (*wall)[4];       // owned
-    double width;            // m, accounting width: spheres stand for what is in this width of the slab
+    int dim;                 // of the scene
+    double (*wall)[4];       // owned, plane
+    double (*triangle)[10];  // owned, space
+    double width;            // m, accounting width: spheres stand for what is in this width of the slab; 1 in space
     double step;             // s, of the discrete elements
     double parcel;           // m, usual radius of a parcel, 0 without bed
     double crust;            // m, radius of the frozen spheres along the bed
@@ -76,7 +78,7 @@ struct silt_coupling {
     double *force;        // owned, 3 per grain, N
     silt_dem_sphere *add; // owned
     double elapsed;       // s, of the running substeps
-    double contact[2];    // N/m, of contacts on all grains, of the last substeps
+    double contact[3];    // N/m, of contacts on all grains, of the last substeps
     double left_mass;
     int64_t left_count;
     silt_error refused; // why a release cannot be; returned by the next start
