@@ -5,6 +5,7 @@
 #include "vector.h"
 
 static const double sweep_left = 0.05;   // what is left of the roughest fields
+static const double sweep_cap = 10.0;    // see sweep_bound
 static const double sweep_sliver = 0.02; // of a regular tetrahedron: gradients are bounded as if a cell had this share of its volume
 
 double silt_sweep_cell(const double c[12], double t, double edge[6]) {
@@ -31,17 +32,16 @@ double silt_sweep_cell(const double c[12], double t, double edge[6]) {
 
 // ---------------------------------------------------------------- the matrix
 
-// rows of M^-1 K; @return the largest eigenvalue that they can have (Gershgorin)
-static double sweep_rows(silt_sweep *w, const silt_mesh *mesh, const int *node, const int *place, const double *volume,
+// rows of M^-1 K
+static void sweep_rows(silt_sweep *w, const silt_mesh *mesh, const int *node, const int *place, const double *volume,
                          const double *edge) {
     static const int pair[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}};
-    double most = 0.0;
     int filled = 0;
     for (int k = 0; k <= w->n; k++)
         w->row[k] = 0.0;
     for (int k = 0; k < w->n; k++) {
         const int i = node[k];
-        double around = 0.0, sum = 0.0;
+        double sum = 0.0;
         w->start[k] = filled;
         w->inverse[k] = volume[i] > 0.0 ? 1.0 / volume[i] : 1.0; // a node without a cell keeps what is asked of it
         for (int m = mesh->node_cell_start[i]; m < mesh->node_cell_start[i + 1]; m++) {
@@ -60,14 +60,30 @@ static double sweep_rows(silt_sweep *w, const silt_mesh *mesh, const int *node, 
             w->index[filled] = j;
             w->weight[filled++] = w->row[j];
             sum += w->row[j];
-            around += fabs(w->row[j]);
             w->row[j] = 0.0;
         }
         w->row[w->n] = 0.0;
         w->diagonal[k] = sum;
-        most = silt_max(most, sum + around);
     }
     w->start[w->n] = filled;
+}
+
+// Slivers make rows that are many times what a good mesh has, about 5 t/M^(2/3), and ask for twice as many sweeps: such rows and their
+// columns are cut. @return the largest eigenvalue that the rows can have (Gershgorin)
+static double sweep_bound(silt_sweep *w, double t) {
+    double most = 0.0;
+    for (int k = 0; k < w->n; k++)
+        w->row[k] = silt_min(1.0, sweep_cap * t * cbrt(silt_square(w->inverse[k])) / silt_max(w->diagonal[k], 1e-300));
+    for (int k = 0; k < w->n; k++) {
+        double around = 0.0;
+        w->diagonal[k] = 0.0;
+        for (int j = w->start[k]; j < w->start[k + 1]; j++) {
+            w->weight[j] *= silt_min(w->row[k], w->row[w->index[j]]);
+            w->diagonal[k] += w->weight[j];
+            around += fabs(w->weight[j]);
+        }
+        most = silt_max(most, w->diagonal[k] + around);
+    }
     return most;
 }
 
@@ -96,7 +112,7 @@ static void sweep_polynomial(silt_sweep *w, double most) {
 }
 
 void silt_sweep_build(silt_sweep *w, const silt_mesh *mesh, int n, const int *node, const int *place, const double *volume,
-                      const double *edge) {
+                      const double *edge, double t) {
     int most = 0;
     for (int k = 0; k < n; k++)
         most += mesh->neighbour_start[node[k] + 1] - mesh->neighbour_start[node[k]];
@@ -109,7 +125,8 @@ void silt_sweep_build(silt_sweep *w, const silt_mesh *mesh, int n, const int *no
     SILT_RESERVE(w->weight, w->weight_capacity[1], most + 1);
     for (int k = 0; k < 2; k++)
         SILT_RESERVE(w->work[k], w->work_capacity[k], SWEEP_FIELDS * (n + 1));
-    sweep_polynomial(w, sweep_rows(w, mesh, node, place, volume, edge));
+    sweep_rows(w, mesh, node, place, volume, edge);
+    sweep_polynomial(w, sweep_bound(w, t));
 }
 
 // ---------------------------------------------------------------- fields
