@@ -128,6 +128,8 @@ EXCHANGE smooth(const int D, silt_exchange *e, const double *water) {
     silt_kernel_solve(&e->kernel, n_field, read);
 }
 
+void silt_exchange_slope(const silt_exchange *e, int near, double slope[4][3]) { BY_DIM(e, exchange_slope, e, &e->cell[near], slope); }
+
 // Velocity and pressure gradient as grains feel them: sum_i w_ip u_i is the value of H^-1 M u at a grain, and that of
 // H^-1 sum_e A_e/3 grad p_e the gradient. One solve for both. water: velocity and pressure at the nodes that are looked at
 static void exchange_smooth(silt_exchange *e, const double *water) { BY_DIM(e, smooth, e, water); }
@@ -155,14 +157,16 @@ static void exchange_pack(silt_exchange *e, double dt) {
             }
             diameter[i] = g->diameter;
             number[i] = idle ? 0.0 : g->number;
-            to->pace[i] = dt / g->mass;
+            to->pace[i] = g->held ? 0.0 : dt / g->mass;
             to->solid[i] = idle ? 0.0 : g->solid;
             for (int k = 0; k < D; k++) {
                 to->v[k][i] = g->v[k];
-                to->start[k][i] = g->v[k] + dt * e->gravity[k] + to->pace[i] * g->contact[k];
+                to->start[k][i] = g->v[k] + (g->held ? 0.0 : dt * e->gravity[k] + to->pace[i] * g->contact[k]);
             }
         }
         silt_drag_numbers(e->law, e->density, e->viscosity, diameter, number, solid, to->number);
+        if (silt_forces_on(&e->force))
+            silt_force_pack(e, m, dt);
     }
 }
 
@@ -193,7 +197,8 @@ VECTOR_INLINE eight square_of(const int D, const eight *v) {
     return sum;
 }
 
-EXCHANGE give(const int D, const silt_exchange *e, bool renew) {
+EXCHANGE give(const int D, silt_exchange *e, bool renew) {
+    const bool more = silt_forces_on(&e->force);
     for (int m = 0; m < e->n_group; m++) {
         exchange_group *g = &e->group[m];
         eight felt[READ_MOST], *v = (eight *)g->v, *start = (eight *)g->start, *free_v = (eight *)g->free;
@@ -215,6 +220,8 @@ EXCHANGE give(const int D, const silt_exchange *e, bool renew) {
             out[GIVE_PUSH(k)] = *effective * free_v[k];
             out[GIVE_FLUX(D, k)] = solid * (v[k] + end) / 2.0;
         }
+        if (more)
+            silt_force_give(e, m, (const double *)felt, (double *)out);
         for (int i = 0; i < DRAG_GROUP; i++) {
             eight one = {out[0][i], out[1][i], out[2][i], out[3][i], out[4][i]};
             for (int k = 5; k < 1 + 2 * D; k++)
@@ -225,17 +232,18 @@ EXCHANGE give(const int D, const silt_exchange *e, bool renew) {
     }
 }
 
-VECTOR_CLONES static void exchange_give_plane(const silt_exchange *e, bool renew) { give(2, e, renew); }
+VECTOR_CLONES static void exchange_give_plane(silt_exchange *e, bool renew) { give(2, e, renew); }
 
-VECTOR_CLONES static void exchange_give_space(const silt_exchange *e, bool renew) { give(3, e, renew); }
+VECTOR_CLONES static void exchange_give_space(silt_exchange *e, bool renew) { give(3, e, renew); }
 
 // Free velocity and drag of every grain, with new coefficients when `renew`; what it gives is added to the nodes. Eight grains at a
 // time: ten thousand take 0.3 ms, one by one 0.7 ms.
-static void exchange_give(const silt_exchange *e, bool renew) {
+static void exchange_give(silt_exchange *e, bool renew) {
     e->dim == 3 ? exchange_give_space(e, renew) : exchange_give_plane(e, renew);
 }
 
 EXCHANGE force(const int D, silt_exchange *e, silt_exchange_totals *t) {
+    const bool more = silt_forces_on(&e->force);
     eight drag_sum[3] = {{0.0}}, pressure_sum[3] = {{0.0}}, size = {0.0};
     for (int m = 0; m < e->n_group; m++) {
         const exchange_group *g = &e->group[m];
@@ -246,6 +254,9 @@ EXCHANGE force(const int D, silt_exchange *e, silt_exchange_totals *t) {
         for (int k = 0; k < D; k++) {
             pressure[k] = -solid * felt[READ_GRADIENT(D, k)];
             drag[k] = effective * (felt[READ_VELOCITY(k)] - free_v[k]);
+            if (more)
+                drag[k] = *(const eight *)e->force.group[m].coefficient * felt[READ_VELOCITY(k)] -
+                          *(const eight *)e->force.group[m].push[k];
             drag_sum[k] += drag[k];
             pressure_sum[k] += pressure[k];
         }
@@ -259,6 +270,10 @@ EXCHANGE force(const int D, silt_exchange *e, silt_exchange_totals *t) {
                 to->pressure[k] = pressure[k][i];
                 to->force[k] = drag[k][i] + pressure[k][i];
             }
+            for (int k = 0; k < (more ? 3 : 0); k++)
+                to->torque[k] = 0.0;
+            for (int k = D == 3 ? 0 : 2; k < (e->force.def.spin ? 3 : 0); k++)
+                to->torque[k] = e->force.group[m].torque[D == 3 ? k : 0][i];
         }
     }
     for (int i = 0; i < DRAG_GROUP; i++) {
@@ -339,10 +354,14 @@ static void exchange_update(void *self, const double *velocity, const double *pr
         exchange_pack(e, dt);
     exchange_midpoint(e, dt);
     exchange_smooth(e, e->seen);
+    if (silt_forces_sheared(&e->force))
+        silt_force_fields(e);
     memset(e->give, 0, GIVE_FIELDS * ((size_t)e->n_look + 1) * sizeof *e->give);
     exchange_give(e, e->refresh || fresh);
     silt_kernel_solve(&e->kernel, GIVE_FIELDS, e->give);
     exchange_take(e);
+    if (e->force.def.spin)
+        silt_force_couple(e);
     exchange_source(e);
     e->dt = dt;
 }
@@ -540,7 +559,9 @@ void silt_exchange_begin(silt_exchange *e, const silt_nodes *nodes, double dt) {
     memset(e->push, 0, (size_t)(e->dim * e->n_node) * sizeof *e->push);
     memset(e->source, 0, (size_t)e->n_node * sizeof *e->source);
     e->dt = NAN; // whatever dt is, the coefficients are of another step
+    e->force.starting = true;
     exchange_update(e, nodes->v, nodes->p, dt);
+    e->force.starting = false;
 }
 
 silt_status silt_exchange_prepare(silt_exchange *e, const silt_nodes *nodes, const silt_mesh *mesh, double dt,
@@ -559,8 +580,8 @@ void silt_exchange_load(silt_exchange *e, const double *velocity, const double *
     exchange_midpoint(e, dt);
     exchange_gather(e, velocity, pressure, e->spare);
     const int D = e->dim;
-    for (int m = 0; m < e->kernel.n_node; m++)
-        for (int k = 0, i = e->kernel.node[m]; k < D; k++)
+    for (int m = 0; m < e->n_look; m++)
+        for (int k = 0, i = e->look[m]; k < D; k++)
             t->water[k] += e->push[D * i + k] - e->coefficient[i] * e->spare[(D + 1) * m + k];
 
     // drag as the water felt it: accepted velocity, free velocity of the last update
@@ -570,6 +591,7 @@ void silt_exchange_load(silt_exchange *e, const double *velocity, const double *
 
 void silt_exchange_clear(silt_exchange *e) {
     silt_kernel_clear(&e->kernel);
+    silt_forces_clear(&e->force);
     free(e->grain);
     free(e->solid);
     free(e->coefficient);

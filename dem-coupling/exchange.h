@@ -12,6 +12,7 @@
 #define SILT_EXCHANGE_H
 
 #include "drag.h"
+#include "force.h"
 #include "kernel.h"
 
 typedef struct silt_exchange_grain {
@@ -22,6 +23,9 @@ typedef struct silt_exchange_grain {
     double diameter;   // m, of the grains that the drag law sees
     double number;     // 1/m, how many of these the parcel is, per metre of width
     double contact[3]; // N/m, of contacts in the last step
+    double spin[3];    // 1/s; looked at where there is a torque on it
+    double gyration;   // m, radius of gyration of the sphere that spins, sqrt(0.4) times its radius
+    bool held;         // stays as fast as it is, whatever acts on it
     int cell;          // of the water's mesh, -1: not in the water
     double weight[4];  // barycentric, in that cell
     // results of load
@@ -30,13 +34,14 @@ typedef struct silt_exchange_grain {
     double free[3];     // m/s, v_free of the last update
     double pressure[3]; // N/m, force of the pressure gradient
     double force[3];    // N/m, all of the water's force; out of the water as it was before
+    double torque[3];   // N m/m, the water's, where it is asked for
 } silt_exchange_grain;
 
 /** what passed between grains and water in a step, N per m of width */
 typedef struct silt_exchange_totals {
     double pressure[3]; // of the pressure gradient on grains
-    double drag[3];     // of drag on grains
-    double water[3];    // of drag on the water: sum over nodes of push - coefficient u; minus drag to rounding
+    double drag[3];     // of drag on grains, and of all other forces but the pressure gradient's
+    double water[3];    // of these on the water: sum over nodes of push - coefficient u; minus drag to rounding
     double size;        // sum over grains of the magnitudes of both parts
 } silt_exchange_totals;
 
@@ -63,6 +68,7 @@ typedef struct silt_exchange {
     double density, viscosity; // of the water
     double gravity[3];
     double width; // m, of the kernel
+    silt_forces force; // its def; forces besides drag and pressure gradient
     bool refresh; // update also renews the coefficients; the fluid must then read them anew
     // given before prepare
     int n_grain, grain_capacity;
@@ -115,6 +121,8 @@ silt_status silt_exchange_prepare(silt_exchange *exchange, const silt_nodes *nod
 /** Final forces on the grains and the totals, from the accepted velocity (that the mesh moves with, as in update) and
  * pressure. Coefficients, free velocities and cells are those of the last update: what the water felt. */
 void silt_exchange_load(silt_exchange *exchange, const double *velocity, const double *pressure, double dt);
+/** A third (space: a quarter) of a near cell's measure times the gradients of its shape functions, at the middle of the step */
+void silt_exchange_slope(const silt_exchange *exchange, int near, double slope[4][3]);
 void silt_exchange_clear(silt_exchange *exchange);
 
 #endif

@@ -4,7 +4,7 @@
 #ifndef BED_BENCH_H
 #define BED_BENCH_H
 
-#include "bed.h"
+#include "bed_law.h"
 #include "delaunay.h"
 
 #include <setjmp.h>

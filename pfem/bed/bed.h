@@ -37,12 +37,6 @@ silt_status silt_bed_create(silt_bed *bed, const silt_scene *scene, silt_error *
 void silt_bed_clear(silt_bed *bed);
 /** unit normal out of the bed at an exposed node, from its exposed edges */
 void silt_bed_normal(const silt_bed *bed, int node, double normal[2]);
-/** Adds a step's frictional work at the exposed nodes (law, threshold and distance of the scene), and refreshes bed->shear. */
-void silt_bed_wear(silt_bed *bed, const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh,
-                   const silt_locator *locator, double dt);
-/** Exposed nodes whose accumulator is full, fullest first: work >= W_c, with a layer eroded >= mass per exposed length of the
- * patch. Ask once a step: what that step's releases expose comes in the next. @return how many (at most capacity) */
-int silt_bed_due(const silt_bed *bed, const silt_scene *scene, int capacity, int *due);
 void silt_bed_patch(const silt_bed *bed, int node, silt_patch *patch);
 /** Takes the patch out of the bed: its cells vanish, nodes without cells die (their fluid_node stays for the caller to read),
  * newly exposed ones start with the excess over W_c, shared over their lengths of surface, at most one layer. The pore water

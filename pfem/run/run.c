@@ -2,6 +2,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include "bed_law.h"
 #include "parallel.h"
 #include "run.h"
 
@@ -241,8 +242,10 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     for (int attempt = 0;; attempt++) {
         if (scene->fluid.on)
             status = water_step(run, &n, err);
-        else if (run->coupling)
+        else if (run->coupling) {
+            silt_walls_move(&run->walls, scene, run->time + run->dt, run->dt);
             status = silt_coupling_dem.prepare(run->coupling, &run->nodes, &run->mesh, run->dt, &run->drag, err);
+        }
         if (status != SILT_OK) {
             run->dt = attempt == 0 ? before : run->dt;
             return status;

@@ -1,4 +1,5 @@
 // what goes from the bed to the grains and back: release, parcels that wait for room, deposition
+#include "bed_law.h"
 #include "run.h"
 
 #define DEPOSIT_SPEED 0.05  // of sqrt((s - 1) g d)
