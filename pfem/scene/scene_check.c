@@ -15,11 +15,11 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     bool has_bodies = scene->n_body > 0;
     if (scene->dimension == 3) {
         // the others were refused already
-        grains = bodies = NULL;
+        bodies = NULL;
         if (!fluid)
             silt_complain(
                 reader, root,
-                "key 'fluid': found no water, allowed a scene with fluid: the rest is two-dimensional so far");
+                "key 'fluid': found no water, allowed a scene with fluid: in three dimensions grains come with water so far");
     } else if (!fluid && !grains && !has_bodies && !bodies)
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
