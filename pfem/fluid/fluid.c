@@ -640,8 +640,10 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         SILT_PARALLEL(f->n_node)
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
-        // on the way the momentum is solved no further than it is worth; the iterate that ends it is solved out
-        const double drop = def->scheme == SCHEME_IMPLICIT && before > 10 * strict * def->tolerance ? 1e-3 : 0;
+        // on the way the momentum is solved no further than it is worth: what refreshes are taken from farther; the iterate that ends
+        // it is solved out
+        const double worth = f->iterations == 0 ? 1e-5 : refresh ? 1e-3 : 1e-2;
+        const double drop = def->scheme == SCHEME_IMPLICIT && before > 10 * strict * def->tolerance ? worth : 0;
         bool solved;
         SILT_TRY(velocity_star(f, s, stiff > 0, drop, &solved, err));
         int worst_node = star_continuity(f, s, p);
