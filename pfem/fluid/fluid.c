@@ -517,11 +517,11 @@ static bool choose_theta(silt_fluid *f, const silt_step *s) {
     return f->theta > before;
 }
 
-// The momentum, or momentum and continuity as one system: once a step, the latter in every pass where viscosity changes in all of them.
-// Conjugate gradients make up for what the momentum's factor is behind.
+// The momentum, or momentum and continuity as one system, once a step: passes make up for what viscosity has changed by since (mud that
+// collapses, 13 passes with a factor for each, 12.5 with one).
 static silt_status factor_stiff(silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
     silt_status status;
-    if (silt_stiff_ready(f->stiff, pressure) && (!pressure || s->scene->fluid.rheology == RHEOLOGY_NEWTONIAN))
+    if (silt_stiff_ready(f->stiff, pressure))
         return SILT_OK;
     SILT_CLOCKED(matrix, status = silt_stiff_factor(&f->stiff, f, s, pressure, err));
     return status;
