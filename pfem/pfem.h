@@ -356,6 +356,7 @@ struct silt_bed {
     double solid_mass;   // kg/m, sum of mass
     double initial_mass; // kg/m
     double pore_water;   // kg/m, released to the water since the start less taken up
+    double y_plus;       // of the first cell on the bed in the last step, the largest; 0: the law takes no gradient
     struct silt_bed_index *index; // owned, cells by node and by place (bed_mesh.h); every change keeps it up to date
 };
 
@@ -403,6 +404,7 @@ typedef struct silt_ledger {
     double inflow_mass, outflow_mass;             // water, cumulative, kg
     double pore_water_mass;                       // released less taken up, cumulative, kg
     double bed_mass, released_mass, deposited_mass, left_mass;      // sediment, cumulative, kg
+    double bed_shear, bed_work, bed_y_plus;       // Pa, J/m3, largest on the bed's surface; see bed.y_plus
     double initial_sediment;
     int grain_count;
     double grain_mass, sediment_error;

@@ -190,6 +190,7 @@ static void test_onset_dissipation(void **state) {
     bench b;
     bench_flat(&b, 0.05, 0.01, 1);
     b.scene.bed.law = BED_DISSIPATION;
+    b.scene.bed.shear = SHEAR_GRADIENT;
     for (int k = 0; k < b.nodes.count; k++)
         if (b.nodes.x[2 * k + 1] < 0.1 + 1e-9)
             b.nodes.v[2 * k] = 0;
@@ -202,6 +203,7 @@ static void test_onset_dissipation(void **state) {
     // water that turns like a solid does no work
     bench_flat(&b, 0.05, 0.01, 0);
     b.scene.bed.law = BED_DISSIPATION;
+    b.scene.bed.shear = SHEAR_GRADIENT;
     for (int k = 0; k < b.nodes.count; k++) {
         b.nodes.v[2 * k] = -3 * (b.nodes.x[2 * k + 1] - 0.1);
         b.nodes.v[2 * k + 1] = 3 * b.nodes.x[2 * k];

@@ -39,22 +39,16 @@ void silt_bed_patch(const silt_bed *bed, int node, silt_patch *patch) {
 void silt_bed_release(silt_bed *bed, const silt_scene *scene, const silt_patch *patch) {
     if (patch->n_cell == 0)
         return;
-    // what was done beyond the release, over the node's length of surface
-    const double length = bed->index->length[patch->node];
-    double work, eroded;
-    silt_bed_excess(bed, scene, patch, &work, &eroded);
+    silt_bed_heirs heirs;
+    silt_bed_heirs_take(&heirs, bed, scene, patch);
 
     // the patch's own edges: those on the surface go, those towards the rest of the bed come
     const int dim = bed_dim(bed), n_ring = patch->n_cell;
-    int ring[PATCH_CELLS][4], buried[4 * PATCH_CELLS], n_buried = 0;
+    int ring[PATCH_CELLS][4];
     for (int k = 0; k < n_ring; k++)
         memcpy(ring[k], bed->cell[patch->cell[k]], sizeof ring[k]);
     for (int k = n_ring - 1; k >= 0; k--)
         silt_bed_cell_remove(bed, patch->cell[k]);
-    for (int k = 0; k < n_ring; k++)
-        for (int a = 0; a <= dim; a++)
-            if (bed->alive[ring[k][a]] && !bed->exposed[ring[k][a]])
-                buried[n_buried++] = ring[k][a];
     for (int k = 0; k < n_ring; k++)
         for (int a = 0; a <= dim; a++) {
             int facet[3], turned[3];
@@ -66,29 +60,7 @@ void silt_bed_release(silt_bed *bed, const silt_scene *scene, const silt_patch *
         }
     silt_bed_refresh(bed);
     bed->pore_water += scene->bed.saturation * (patch->area - patch->mass / scene->bed.density) * scene->fluid.density;
-
-    // newly exposed nodes start with the excess, shared over their lengths of surface
-    double fresh = 0;
-    for (int k = 0; k < n_buried; k++) {
-        bool again = false;
-        for (int q = 0; q < k; q++)
-            again |= buried[q] == buried[k];
-        if (again || !bed->exposed[buried[k]])
-            buried[k--] = buried[--n_buried];
-        else
-            fresh += bed->index->length[buried[k]];
-    }
-    const double share = fresh > 0 ? silt_min(length / fresh, 1) : 0;
-    for (int k = 0; k < n_buried; k++) {
-        bed->work[buried[k]] = share * work;
-        bed->eroded[buried[k]] = share * eroded;
-        bed->shear[buried[k]] = 0;
-    }
-    // what no longer is the bed's surface forgets its work
-    for (int k = 0; k < n_ring; k++)
-        for (int a = 0; a <= dim; a++)
-            if (!bed->exposed[ring[k][a]])
-                bed->work[ring[k][a]] = bed->eroded[ring[k][a]] = bed->shear[ring[k][a]] = 0;
+    silt_bed_heirs_give(&heirs, bed);
 }
 
 // ---------------------------------------------------------------- loose pieces

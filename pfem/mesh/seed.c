@@ -436,7 +436,9 @@ static void seed_velocity(seed *s, int first) {
     silt_nodes *nodes = s->nodes;
     const double g = silt_length(3, scene->gravity);
     for (int i = first; i < nodes->count; i++) {
-        if ((nodes->kind[i] != NODE_FLUID && nodes->kind[i] != NODE_OPEN) || scene->fluid.velocity.kind == FORMULA_NONE)
+        // water that slips on the bed moves with the rest
+        const bool slips = nodes->kind[i] == NODE_BED && scene->bed.condition != WALL_NO_SLIP;
+        if ((nodes->kind[i] != NODE_FLUID && nodes->kind[i] != NODE_OPEN && !slips) || scene->fluid.velocity.kind == FORMULA_NONE)
             continue;
         double v[3] = {0}, x[3] = {0};
         memcpy(x, nodes->x + s->dim * i, (size_t)s->dim * sizeof *x);

@@ -56,6 +56,7 @@ struct silt_run {
     int grown_area_capacity;
     double *grown_area;    // owned
     int64_t bed_revision;  // that nodes and coupling know
+    bool bed_told;         // that the shear on the bed is not resolved
     double wear_ahead;     // s, that the bed was worn for and the water has still to go: of steps cut after that
 
     // clocks: time = frame * output + offset, with offset = tick * step of the coupling when there is one

@@ -100,7 +100,7 @@ void silt_run_release(silt_run *run) {
             if (run->bed.alive[due[k]])
                 release_node(run, due[k]);
     }
-    if (isfinite(run->scene->bed.work))
+    if (silt_bed_erodes(&run->scene->bed))
         release_hanging(run);
     if (run->coupling && run->bed.revision != run->bed_revision) {
         silt_coupling_dem.bed_changed(run->coupling, &run->bed);
@@ -185,7 +185,7 @@ silt_status silt_run_deposit(silt_run *run, silt_error *err) {
     (void)err;
     const silt_scene *scene = run->scene;
     const silt_grain_state *grains = silt_coupling_dem.grains(run->coupling);
-    if (!scene->bed.on || !scene->bed.deposition || !isfinite(scene->bed.work))
+    if (!scene->bed.on || !scene->bed.deposition || !silt_bed_erodes(&scene->bed))
         return SILT_OK;
     const double g = gravity_of(scene);
     // the clocks of rest, merged by id

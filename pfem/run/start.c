@@ -26,12 +26,33 @@ void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def) {
     memcpy(def->hi, run->box_hi, sizeof def->hi);
 }
 
-// everything that walls, regions and bodies span, and room for splashes
+// everything that walls wherever they go, regions and bodies span, and room for splashes
 static void box_span(double lo[3], double hi[3], const double *x, int dim, double reach) {
     for (int d = 0; d < dim; d++) {
         lo[d] = silt_min(lo[d], x[d] - reach);
         hi[d] = silt_max(hi[d], x[d] + reach);
     }
+}
+
+// Where walls come in the course of their motion, from row to row, with places between for those that turn: the discrete elements
+// lose what leaves the box.
+static void box_motion(silt_run *run, double lo[3], double hi[3]) {
+    enum { BETWEEN = 16 };
+    const silt_scene *scene = run->scene;
+    for (int w = 0; w < scene->n_wall && scene->dimension != 3; w++) {
+        const silt_series *motion = &scene->wall[w].motion;
+        for (int r = 0; r < BETWEEN * motion->n_row; r++) {
+            const double *row = motion->value + (size_t)(r / BETWEEN) * (size_t)motion->n_column;
+            const double next = r / BETWEEN + 1 < motion->n_row ? row[motion->n_column] : row[0];
+            const double time = row[0] + (double)(r % BETWEEN) / BETWEEN * (next - row[0]);
+            silt_walls_move(&run->walls, scene, silt_min(time, scene->time.end), 0);
+            for (int s = 0; s < run->walls.count; s++) {
+                box_span(lo, hi, run->walls.from[s], 2, 0);
+                box_span(lo, hi, run->walls.to[s], 2, 0);
+            }
+        }
+    }
+    silt_walls_move(&run->walls, scene, 0, 0);
 }
 
 void silt_run_box(silt_run *run) {
@@ -55,12 +76,14 @@ void silt_run_box(silt_run *run) {
             box_span(lo, hi, a, D, 0);
             box_span(lo, hi, b, D, 0);
         }
+    if (silt_scene_has_dem(scene))
+        box_motion(run, lo, hi);
     for (int i = 0; i < run->nodes.count; i++)
         box_span(lo, hi, run->nodes.x + D * i, D, 0);
     for (int b = 0; b < scene->n_body; b++)
         box_span(lo, hi, scene->body[b].at, D, silt_max(scene->body[b].scale, scene->body[b].height));
-    for (int k = 0; k < scene->grains.n_grain; k++)
-        box_span(lo, hi, scene->grains.grain[k].at, D, scene->grains.grain[k].diameter);
+    for (int k = 0; k < silt_scene_grains(scene); k++)
+        box_span(lo, hi, silt_scene_grain(scene, k)->at, D, silt_scene_grain(scene, k)->diameter);
     // nothing holds water that has no walls: it may go far
     double margin = 0;
     for (int d = 0; d < D; d++)
