@@ -28,8 +28,7 @@ struct silt_dem {
     int n_remove, cap_remove, n_add, cap_add;
     int64_t *remove;      // owned
     silt_dem_sphere *add; // owned
-    int n_torque, cap_torque;
-    double *torque; // owned, of the next run
+    const double *torque; // borrowed, of the next run, NULL: none
     double (*rate)[3]; // owned, velocity and spin of every motion
     int n_solid, cap_solid, n_free, n_free_sphere;
     dem_solid *solid; // owned
@@ -77,7 +76,6 @@ void silt_dem_close(silt_dem **dem) {
                      (void *)d->def.motion,
                      d->rate,
                      d->live,
-                     d->torque,
                      d->remove,
                      d->add,
                      d->solid,
@@ -530,7 +528,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     s->n_remove = dem->n_remove;
     s->n_add = dem->n_add + n_fixed;
     s->n_force = force ? dem->state.n_grain : 0;
-    s->n_torque = dem->n_torque == dem->state.n_grain ? dem->n_torque : 0;
+    s->n_torque = dem->torque ? dem->state.n_grain : 0;
     s->max_grain = n_grain + dem->n_add;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
@@ -540,9 +538,9 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     // the layout may have moved: walls and bodies stand before what changes length
     if (force)
         memcpy(DEM_SECTION(s, double, force), force, 3 * (size_t)dem->state.n_grain * sizeof(double));
-    if (s->n_torque)
+    if (dem->torque)
         memcpy(DEM_SECTION(s, double, torque), dem->torque, 3 * (size_t)s->n_torque * sizeof(double));
-    dem->n_torque = 0;
+    dem->torque = NULL;
     for (int k = 0; k < dem->n_solid; k++) {
         if (dem->solid[k].slot < 0)
             continue;
@@ -555,11 +553,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     return dem_link_send(&dem->link, DEM_RUN, err);
 }
 
-void silt_dem_twist(silt_dem *dem, const double *torque) {
-    dem->n_torque = dem->state.n_grain;
-    SILT_RESERVE(dem->torque, dem->cap_torque, 3 * dem->n_torque + 3);
-    memcpy(dem->torque, torque, 3 * (size_t)dem->n_torque * sizeof *torque);
-}
+void silt_dem_twist(silt_dem *dem, const double *torque) { dem->torque = torque; }
 
 void silt_dem_keep(silt_dem *dem) {
     dem->keep = true;

@@ -402,7 +402,7 @@ static void worker_load(void) {
     for (int i = 0; i < a.n; i++) {
         for (int c = 0; c < 2; c++)
             a.force[i][c] -= f[i][c];
-        if (s->n_torque && a.type[i] == DEM_TYPE_GRAIN)
+        if (a.type[i] == DEM_TYPE_GRAIN)
             a.torque[i][2] -= t[i][2];
         memset(f[i], 0, 3 * sizeof(double)), memset(t[i], 0, 3 * sizeof(double));
     }

@@ -52,6 +52,29 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         silt_complain(reader, regions, "key 'bed.regions': found an empty list, allowed at least one region");
 }
 
+// seepage has its law's number and water to flow in
+static void check_seepage(silt_reader *reader, const silt_scene *scene) {
+    const silt_bed_def *bed = &scene->bed;
+    const silt_tree *node = silt_tree_item(reader->root, "bed");
+    if (!bed->on)
+        return;
+    if (bed->seepage == SEEPAGE_DARCY && bed->permeability == 0)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.permeability': found none beside seepage: darcy, allowed a number in m2, > 0");
+    if (bed->seepage != SEEPAGE_DARCY && bed->permeability > 0)
+        silt_complain(reader, silt_tree_item(node, "permeability"),
+                      "key 'bed.permeability': found %.10g, allowed with seepage: darcy alone", bed->permeability);
+    if (bed->seepage != SEEPAGE_NONE && !scene->fluid.on)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.seepage': found it without water, allowed in a scene with fluid");
+    if (bed->seepage != SEEPAGE_NONE && scene->fluid.on && scene->fluid.viscosity == 0)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.seepage': found it beside fluid.viscosity: 0, allowed with a viscosity > 0");
+    if (bed->seepage != SEEPAGE_NONE && scene->fluid.on && scene->fluid.pressure == PRESSURE_LAPLACIAN)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.seepage': found it beside fluid.pressure: laplacian, allowed consistent there");
+}
+
 // a number of frames that fits their names
 static void check_time(silt_reader *reader, const silt_scene *scene) {
     if (scene->time.output > 0 && scene->time.end / scene->time.output > 999999)
@@ -493,11 +516,16 @@ static const char *const check_fixed[] = {"step",
                                           "bed_shear",
                                           "bed_work",
                                           "bed_y_plus",
+                                          "seepage",
+                                          "seepage_volume",
+                                          "seepage_lost",
                                           "grain_count",
                                           "grain_mass",
                                           "grain_velocity_x",
                                           "grain_velocity_y",
                                           "grain_velocity_z",
+                                          "grain_kinetic_energy",
+                                          "grain_potential_energy",
                                           "grain_water_x",
                                           "grain_water_y",
                                           "grain_water_z",
@@ -743,6 +771,9 @@ static void check_gauges(silt_reader *reader, const silt_scene *scene) {
             silt_complain(reader, silt_tree_item(node, "force_on"),
                           "key 'gauges.%d.force_on': found %d, allowed the number of a wall, the first is 0; there are %d", i,
                           gauge->index, scene->n_wall);
+        const bool grains = gauge->kind == GAUGE_GRAIN_FRONT || gauge->kind == GAUGE_GRAIN_HEIGHT || gauge->kind == GAUGE_GRAIN_SLOPE;
+        if (grains && !scene->grains.on)
+            silt_complain(reader, node, "key 'gauges.%d': found a gauge of grains, allowed in a scene with a block grains", i);
         if (gauge->kind == GAUGE_EXTENT && gauge->from[0] == 2 && scene->dimension != 3)
             silt_complain(reader, silt_tree_item(node, "extent"),
                           "key 'gauges.%d.extent': found z, allowed x or y in two dimensions", i);
@@ -752,6 +783,7 @@ static void check_gauges(silt_reader *reader, const silt_scene *scene) {
 void silt_scene_check(silt_reader *reader, silt_scene *scene) {
     check_blocks(reader, scene);
     check_time(reader, scene);
+    check_seepage(reader, scene);
     check_tension(reader, scene);
     check_walls(reader, scene);
     const check_box box = check_box_make(scene, true);

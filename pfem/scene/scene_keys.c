@@ -38,6 +38,8 @@ static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, 
                                       {"shields", BED_SHIELDS}, {0}};
 static const silt_word shear_words[] = {{"default", SHEAR_DEFAULT}, {"paper", SHEAR_PAPER}, {"gradient", SHEAR_GRADIENT},
                                         {"log-law", SHEAR_LOG_LAW}, {0}};
+static const silt_word seepage_words[] = {
+    {"none", SEEPAGE_NONE}, {"darcy", SEEPAGE_DARCY}, {"kozeny-carman", SEEPAGE_KOZENY_CARMAN}, {0}};
 static const silt_word drag_words[] = {
     {"none", DRAG_NONE},       {"stokes", DRAG_STOKES},         {"schiller-naumann", DRAG_SCHILLER_NAUMANN}, {"abraham", DRAG_ABRAHAM},
     {"di-felice", DRAG_DI_FELICE}, {"ergun", DRAG_ERGUN},       {"wen-yu", DRAG_WEN_YU},
@@ -387,6 +389,12 @@ static const silt_key bed_rows[] = {
      .doc = "the part of the bed that parcels lie on does not wear"},
     {"saturation", KEY_NUMBER, .fallback = "1", RANGE(0, 1), AT(silt_bed_def, saturation),
      .doc = "share of the pores that holds water"},
+    {"seepage", KEY_WORD, .fallback = "none", .words = seepage_words, AT(silt_bed_def, seepage),
+     .doc = "water in the bed's pores: none, by `permeability`, or by grains.diameter and the pores of each cell, d^2 n^3/(180 (1 - n)^2)"},
+    {"permeability", KEY_NUMBER, .unit = "m2", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, permeability),
+     .doc = "for seepage: darcy; the hydraulic conductivity K in m/s is this times density g/viscosity"},
+    {"fluidise", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, fluidise),
+     .doc = "seepage that outweighs the grains on the surface lifts them off"},
     {"deposition", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, deposition),
      .doc = "resting grains become bed again"},
     {"condition", KEY_WORD, .fallback = "no-slip", .words = condition_words, AT(silt_bed_def, condition),
@@ -508,6 +516,12 @@ static const silt_key gauge_rows[] = {
      AT(silt_gauge_def, from), .doc = "how deep the bed lies under its level at the start, at this x (3-D: [x, y])"},
     {"extent", KEY_SIGN, .flags = KEY_CHOICE, .words = extent_words, .select = GAUGE_EXTENT, AT(silt_gauge_def, from),
      .doc = "length of connected water along this axis, m"},
+    {"grains_front", KEY_SIGN, .flags = KEY_CHOICE, .words = front_words, .select = GAUGE_GRAIN_FRONT, AT(silt_gauge_def, from),
+     .doc = "foremost x to this side of the heap: the grains that hang together, the most mass of them"},
+    {"grains_height_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_GRAIN_HEIGHT, AT(silt_gauge_def, from),
+     .doc = "top of the heap at this x (3-D: [x, y])"},
+    {"grains_slope", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_GRAIN_SLOPE, AT(silt_gauge_def, from),
+     .doc = "angle in degrees by which the top of the heap falls to the right, by least squares between these two x"},
     {"force_on", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(0, INT32_MAX), .select = GAUGE_FORCE,
      AT(silt_gauge_def, index),
      .doc = "force of the water on this wall of the list, from 0; columns NAME_x, NAME_y, NAME_z, N"},
@@ -516,6 +530,8 @@ static const silt_key gauge_rows[] = {
      .doc = "of the water about this point, kg m2/s; in three dimensions columns NAME_x, NAME_y, NAME_z"},
     {"centroid_of", KEY_SIGN, .flags = KEY_CHOICE, .words = water_words, .select = GAUGE_CENTROID,
      AT(silt_gauge_def, from), .doc = "centre of mass of the water, columns NAME_x, NAME_y, NAME_z, m"},
+    {"grains_in", KEY_BOX, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_GRAINS, AT(silt_gauge_def, from),
+     .doc = "of the grains in this box: mean velocity by mass, columns NAME_x, NAME_y, NAME_z, m/s, and their mass, NAME_m, kg (2-D: per metre of width)"},
     {0}};
 TABLE(gauge, "a gauge", silt_gauge_def, offsetof(silt_gauge_def, kind));
 
