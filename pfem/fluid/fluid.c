@@ -2,8 +2,8 @@
 #include "fluid.h"
 
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
-#define FLUID_WHOLE 4.0     // the same, in the mean, from which momentum and continuity are factored as one
-#define FLUID_SLOW 8         // passes after which stiff cells, few as they are, bring that too
+#define FLUID_WHOLE 2.5     // the same, in the mean, from which momentum and continuity are factored as one
+#define FLUID_SLOW 12        // passes after which stiff cells, few as they are, bring that too
 #define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
 #define EXPLICIT_SHARE 0.02 // of the water that may be too stiff for explicit viscosity: slivers
 #define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
