@@ -6,6 +6,7 @@ static const double parcel_least = 0.4, parcel_most = 2.0; // radii of parcels i
 static const double parcel_usual = 0.75;                   // radius that the time step is chosen for
 static const double clump_spacing = 0.3;                   // between a body's spheres, times their radius
 static const double room_overlap = 0.01;                   // of the radius
+static const double heap_porosity = 0.4;                   // of what fills the regions, when it has settled
 static const double period_share = 3.2;                    // slab thickness over the largest sphere's diameter
 
 static void coupling_close(silt_coupling **coupling);
@@ -20,15 +21,13 @@ static double coupling_rayleigh(const silt_contact_def *contact, double radius, 
     return silt_dem_rayleigh(radius, density, contact->youngs_modulus, contact->poissons_ratio);
 }
 
-// a crumb of the bed becomes a sphere that the time step can bear: larger than its mass asks for, see coupling_burden
+// a crumb of the bed becomes a sphere that the time step can bear: larger than its mass asks for, see silt_coupling_burden
 static double coupling_parcel_radius(const silt_coupling *c, double mass) {
     double radius = cbrt(6.0 * c->width * mass / c->scene->bed.density / M_PI) / 2.0;
     return silt_max(radius, parcel_least * c->parcel);
 }
 
-// mass of the sphere over the mass that it stands for in the slab: 1, more for a crumb; forces on it are scaled alike,
-// so that it moves as the crumb would
-static double coupling_burden(const silt_coupling *c, const coupling_grain *g) {
+double silt_coupling_burden(const silt_coupling *c, const coupling_grain *g) {
     double crumb = parcel_least * c->parcel;
     if (c->parcel <= 0.0 || g->radius > crumb)
         return 1.0;
@@ -73,10 +72,13 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     const silt_scene *scene = c->scene;
     const silt_contact_def *contact = &scene->contact;
     const silt_grains_def *grains = &scene->grains;
-    double largest = 0.0, smallest = HUGE_VAL, clump = 0.0, listed = 0.0;
-    for (int i = 0; i < grains->n_grain; i++) {
-        listed = silt_max(listed, grains->grain[i].diameter);
-        smallest = silt_min(smallest, grains->grain[i].diameter / 2.0);
+    double largest = 0.0, smallest = HUGE_VAL, clump = 0.0, listed = 0.0, squares = 0.0, cubes = 0.0;
+    for (int i = 0; i < silt_scene_grains(scene); i++) {
+        const double d = silt_scene_grain(scene, i)->diameter;
+        listed = silt_max(listed, d);
+        smallest = silt_min(smallest, d / 2.0);
+        squares += d * d;
+        cubes += d * d * d;
     }
     largest = listed / 2.0;
     for (int i = 0; i < scene->n_body; i++) {
@@ -100,15 +102,18 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     if (!(c->width > 0.0)) {
         if (c->parcel > 0.0)
             c->width = 2.0 / 3.0 * 0.82 * 2.0 * c->parcel / (1.0 - scene->bed.porosity);
+        else if (grains->n_filled > 0)
+            c->width = 2.0 / 3.0 * 0.82 * cubes / squares / (1.0 - heap_porosity);
         else
             c->width = listed > 0.0 ? 5.0 * listed : 2.0 * largest;
     }
 
     // the stiffest sphere sets the time step; a body's spheres share its mass
     double rayleigh = HUGE_VAL;
-    for (int i = 0; i < grains->n_grain; i++)
-        rayleigh =
-            silt_min(rayleigh, coupling_rayleigh(contact, grains->grain[i].diameter / 2.0, grains->grain[i].density));
+    for (int i = 0; i < silt_scene_grains(scene); i++) {
+        const silt_grain_def *g = silt_scene_grain(scene, i);
+        rayleigh = silt_min(rayleigh, coupling_rayleigh(contact, g->diameter / 2.0, g->density));
+    }
     if (c->parcel > 0.0)
         rayleigh = silt_min(rayleigh, coupling_rayleigh(contact, parcel_usual * c->parcel, scene->bed.density));
     for (int i = 0; i < scene->n_body; i++) {
@@ -129,16 +134,16 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     c->exchange.density = scene->fluid.density;
     c->exchange.viscosity = scene->fluid.viscosity;
     c->exchange.refresh = true;
+    c->exchange.force.def = (silt_force_def){.added_mass = grains->added_mass,
+                                             .theta = scene->fluid.theta,
+                                             .viscous = grains->viscous_force,
+                                             .lift = grains->lift == LIFT_SAFFMAN,
+                                             .spin = grains->rotational_drag};
     for (int k = 0; k < 2; k++)
         c->exchange.gravity[k] = scene->gravity[k];
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
-    c->wall = silt_alloc((size_t)c->walls->count + 1, sizeof *c->wall);
-    for (int i = 0; i < c->walls->count; i++)
-        for (int k = 0; k < 2; k++) {
-            c->wall[i][k] = c->walls->from[i][k];
-            c->wall[i][2 + k] = c->walls->to[i][k];
-        }
+    silt_coupling_walls(c);
     c->dem_def = (silt_dem_def){
         .worker = def->worker,
         .log = def->log,
@@ -155,6 +160,9 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .step = c->step,
         .n_wall = c->walls->count,
         .wall = (const double(*)[4])c->wall,
+        .wall_motion = c->wall_motion,
+        .n_motion = c->n_motion,
+        .motion = (const double(*)[2])c->pivot,
         .max_radius = largest,
         .min_radius = smallest,
         .no_contacts = !scene->bed.on || !scene->bed.deposition,
@@ -364,7 +372,11 @@ static bool coupling_find(silt_coupling *c, const silt_nodes *nodes, const silt_
         to->mass = g->mass;
         to->diameter = g->diameter;
         to->number = g->number;
+        memcpy(to->spin, g->omega, sizeof to->spin);
+        to->gyration = sqrt(0.4) * g->radius;
+        to->held = g->fixed;
         to->force[0] = to->force[1] = 0.0;
+        memset(to->torque, 0, sizeof to->torque);
         to->cell = coupling_locate(c, g, nodes, mesh, &located, to->weight);
         c->wet = c->wet || to->cell >= 0;
     }
@@ -401,9 +413,13 @@ static void coupling_load(silt_coupling *c, const silt_nodes *nodes, const silt_
         silt_exchange_load(&c->exchange, nodes->v, nodes->p, dt);
     else
         c->exchange.totals = (silt_exchange_totals){0};
-    for (int i = 0; i < c->n_grain; i++)
+    for (int i = 0; i < c->n_grain; i++) {
+        const bool loaded = c->wet && i < c->n_loaded;
         for (int k = 0; k < 2; k++)
-            c->grain[i].force[k] = c->wet && i < c->n_loaded ? c->exchange.grain[i].force[k] : 0.0;
+            c->grain[i].force[k] = loaded ? c->exchange.grain[i].force[k] : 0.0;
+        for (int k = 0; k < 3; k++)
+            c->grain[i].torque[k] = loaded ? c->exchange.grain[i].torque[k] : 0.0;
+    }
 }
 
 static void coupling_exchanged(const silt_coupling *c, silt_exchanged *exchanged) {
@@ -432,9 +448,9 @@ static void coupling_add(silt_coupling *c) {
                 continue;
             silt_dem_sphere *s = &c->add[n++];
             *s = (silt_dem_sphere){.id = g->id,
-                                   .kind = DEM_GRAIN,
+                                   .kind = g->fixed ? DEM_FROZEN : DEM_GRAIN,
                                    .radius = g->radius,
-                                   .density = coupling_sphere_density(c, g->mass, g->radius) * coupling_burden(c, g)};
+                                   .density = coupling_sphere_density(c, g->mass, g->radius) * silt_coupling_burden(c, g)};
             memcpy(s->x, g->x, sizeof s->x);
             memcpy(s->v, g->v, sizeof s->v);
             memcpy(s->omega, g->omega, sizeof s->omega);
@@ -474,8 +490,9 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
         while (k < c->n_last && c->last[k] < g->id)
             k++;
         for (int d = 0; d < 2 && k < c->n_last && c->last[k] == g->id; d++)
-            c->force[3 * k + d] = g->force[d] * c->width * coupling_burden(c, g);
+            c->force[3 * k + d] = g->force[d] * c->width * silt_coupling_burden(c, g);
     }
+    silt_coupling_twist(c);
     for (int i = 0; i < c->bodies->count; i++)
         for (int k = 0; k < 3; k++) {
             c->body_force[3 * i + k] = c->bodies->body[i].force[k] * c->width;
@@ -487,6 +504,8 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     c->n_drop = 0;
     coupling_add(c);
     c->elapsed = n * c->step;
+    if (n > 0)
+        silt_coupling_walls_go(c, n);
     return silt_dem_start(c->dem, n, c->force, c->body_force, c->body_torque, err);
 }
 
@@ -547,7 +566,7 @@ static silt_status coupling_complete(const silt_coupling *c, const silt_dem_stat
         const coupling_grain *g = &c->grain[i];
         while (k < state->n_grain && state->id[k] < g->id)
             k++;
-        if ((k == state->n_grain || state->id[k] != g->id) && !coupling_left_domain(c, g))
+        if (!g->fixed && (k == state->n_grain || state->id[k] != g->id) && !coupling_left_domain(c, g))
             return silt_fail(
                 err, SILT_FAILED,
                 "grain %lld vanished: last seen at (%g, %g) with the velocity (%g, %g) m/s and the radius %g m; it "
@@ -562,12 +581,16 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
     const silt_dem_state *state = silt_dem_state_now(c->dem);
     SILT_TRY(coupling_complete(c, state, err));
     c->contact[0] = c->contact[1] = 0.0;
+    if (c->elapsed > 0.0)
+        silt_coupling_walls_stand(c);
     coupling_touched(c);
     for (int i = 0, k = 0; i < c->n_grain; i++) {
         coupling_grain *g = &c->grain[i];
         while (k < state->n_grain && state->id[k] < g->id)
             k++;
-        if (k < state->n_grain && state->id[k] == g->id) {
+        if (g->fixed) {
+            silt_coupling_hold(c, g);
+        } else if (k < state->n_grain && state->id[k] == g->id) {
             coupling_receive(c, g, state, k);
             if (coupling_leaves(&c->scene->fluid, g->old_x, g->x, 0.0))
                 coupling_leave(c, g);
@@ -650,13 +673,16 @@ static silt_status coupling_recover(silt_coupling *c, silt_error *err) {
 }
 
 static void coupling_listed(silt_coupling *c) {
-    for (int i = 0; i < c->scene->grains.n_grain; i++) {
-        const silt_grain_def *def = &c->scene->grains.grain[i];
+    for (int i = 0; i < silt_scene_grains(c->scene); i++) {
+        const silt_grain_def *def = silt_scene_grain(c->scene, i);
         coupling_grain *g = coupling_append(c, def->at, def->velocity, def->diameter / 2.0);
         g->solid = M_PI / 6.0 * def->diameter * def->diameter * def->diameter / c->width;
         g->mass = def->density * g->solid;
         g->diameter = def->diameter;
         g->number = 1.0 / c->width;
+        g->fixed = coupling_fixes(c, g->id);
+        if (g->fixed)
+            memset(g->v, 0, sizeof g->v);
     }
 }
 
@@ -696,7 +722,8 @@ static void coupling_close(silt_coupling **coupling) {
     coupling_view *w = c->view;
     void *owned[] = {w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
-                     c->body,     c->body_force, c->body_torque, c->force, c->add};
+                     c->body,     c->body_force, c->body_torque, c->force, c->add,    c->torque,
+                     c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);

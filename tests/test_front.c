@@ -320,8 +320,8 @@ static void dense(void **state) {
             for (int j = 0; j < rest; j++)
                 for (int i = j; i < rest; i++)
                     update[i + j * rest] = (float)full[own + i][own + j];
-            assert_int_equal(silt_dense_factor(own, wide, whole, panel), -1);
-            silt_dense_update(own, wide, panel, update);
+            assert_int_equal(silt_dense_factor(own, 0, wide, whole, panel), -1);
+            silt_dense_update(own, 0, wide, panel, update);
             for (int j = 0; j < own; j++)
                 for (int i = j; i < wide; i++)
                     l[i][j] = i == j ? 1 / panel[i + j * wide] : panel[i + j * wide];
@@ -352,7 +352,7 @@ static void dense(void **state) {
                 assert_true(fabs(sum - y[j]) < 4 * ROUNDED * wide);
             }
             panel[0] = -1; // not by rounding
-            assert_int_equal(silt_dense_factor(own, wide, whole, panel), 0);
+            assert_int_equal(silt_dense_factor(own, 0, wide, whole, panel), 0);
         }
 }
 

@@ -526,17 +526,16 @@ static silt_status factor_stiff(silt_fluid *f, const silt_step *s, bool pressure
     silt_status status;
     if (silt_stiff_ready(f->stiff, pressure) && !silt_viscosity_varies(s->scene))
         return SILT_OK;
-    SILT_CLOCKED(factor, status = silt_stiff_factor(&f->stiff, f, s, pressure, err));
+    SILT_CLOCKED(matrix, status = silt_stiff_factor(&f->stiff, f, s, pressure, err));
     return status;
 }
 
 static silt_status correct_whole(silt_fluid *f, const silt_step *s, silt_error *err) {
-    silt_status status;
     SILT_TRY(factor_stiff(f, s, true, err));
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
-    SILT_CLOCKED(solve, status = silt_stiff_correct(f->stiff, f, f->residual, f->increment, f->w, err));
-    return status;
+    SILT_CLOCKED(solve, silt_stiff_correct(f->stiff, f, f->residual, f->increment, f->w));
+    return SILT_OK;
 }
 
 // Explicit viscosity: f->stand holds the nodes that it would make unstable (point by point implicit, the fixed point is the same);

@@ -232,10 +232,9 @@ bool silt_stiff_ready(const silt_stiff *stiff, bool pressure);
 /** the step is over */
 void silt_stiff_end(silt_stiff *stiff);
 /** out = (inertia + K)^-1 right on the free components */
-silt_status silt_stiff_momentum(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *out, silt_error *err);
+void silt_stiff_momentum(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *out);
 /** velocity and pressure that together mend continuity: v += dv, (inertia + K) dv = G increment, G^T dv + L increment = right */
-silt_status silt_stiff_correct(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *increment, double *v,
-                               silt_error *err);
+void silt_stiff_correct(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *increment, double *v);
 void silt_stiff_forget(silt_stiff *stiff);
 void silt_stiff_free(silt_stiff **stiff);
 

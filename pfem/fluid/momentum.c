@@ -127,7 +127,7 @@ silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const doub
     double *r = f->cg[0], *s = f->cg[1], *z = factored ? f->scratch : NULL;
     silt_descent c = begin(f, right, v, silt_clamp(1e-6 * step->scene->fluid.tolerance, 1e-12, 1e-9), drop);
     if (factored && c.size > c.target) {
-        SILT_TRY(silt_stiff_momentum(f->stiff, f, r, s, err));
+        silt_stiff_momentum(f->stiff, f, r, s);
         c.rz = silt_products(D * n, r, s);
     }
     while (c.size > c.target) {
@@ -145,7 +145,7 @@ silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const doub
         c.size = advance(f, c.rz / along(f, step->mesh), v);
         double fresh = c.size;
         if (factored && c.size > c.target) {
-            SILT_TRY(silt_stiff_momentum(f->stiff, f, r, z, err));
+            silt_stiff_momentum(f->stiff, f, r, z);
             fresh = silt_products(D * n, r, z);
         }
         BY_CHUNK(turn_chunk, z, fresh / c.rz);

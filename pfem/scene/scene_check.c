@@ -15,7 +15,7 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     bool has_bodies = scene->n_body > 0;
     if (scene->dimension == 3) {
         // the others were refused already
-        bed = grains = bodies = NULL;
+        grains = bodies = NULL;
         if (!fluid)
             silt_complain(
                 reader, root,
@@ -24,9 +24,10 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
                       "one of fluid, grains, bodies");
-    if (bed && !grains)
+    const bool fixed = isinf(scene->bed.work) && !grains; // a bed that gives nothing needs no grains
+    if (bed && !grains && !fixed)
         silt_complain_key(reader, bed,
-                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}: "
+                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}, or with work: .inf: "
                           "eroded bed becomes grains");
     if (bed && scene->grains.on && !silt_tree_item(grains, "parcel"))
         silt_complain_key(reader, grains,
@@ -36,7 +37,7 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         silt_complain(reader, silt_tree_item(grains, "parcel"),
                       "key 'grains.parcel': found 0, allowed a number in m, > 0: "
                       "the bed's parcels need a diameter");
-    const silt_tree *first = bed ? bed : grains ? grains : has_bodies ? bodies : NULL;
+    const silt_tree *first = bed && !fixed ? bed : grains ? grains : has_bodies ? bodies : NULL;
     if (first && !silt_tree_item(root, "contact"))
         silt_complain_key(reader, first,
                           "key '%s': found it without contact properties, allowed with a block contact "
@@ -229,6 +230,13 @@ static void check_inside(silt_reader *reader, const silt_scene *scene) {
         if (!check_box_holds(&box, lo, hi, 0))
             check_outside(reader, silt_tree_find(reader->root, "bed.regions.%d", i), &box, "bed.regions.%d", i);
     }
+    for (int i = 0; box.known && i < scene->grains.n_fill; i++) {
+        if (!check_region_whole(scene, &scene->grains.fill[i].region))
+            continue;
+        silt_region_bounds(&scene->grains.fill[i].region, lo, hi);
+        if (!check_box_holds(&box, lo, hi, 0))
+            check_outside(reader, silt_tree_find(reader->root, "grains.regions.%d", i), &box, "grains.regions.%d", i);
+    }
     for (int i = 0; box.known && i < scene->grains.n_grain; i++) {
         const double *at = scene->grains.grain[i].at;
         if (!check_box_holds(&box, at, at, 0))
@@ -305,13 +313,6 @@ static check_shape check_shape_make(const silt_body_def *body) {
     return shape;
 }
 
-// from x to the segment a b
-static double check_distance(const double *a, const double *b, const double *x) {
-    double ux = b[0] - a[0], uy = b[1] - a[1], length = ux * ux + uy * uy;
-    double share = length > 0 ? silt_clamp(((x[0] - a[0]) * ux + (x[1] - a[1]) * uy) / length, 0, 1) : 0;
-    return hypot(a[0] + share * ux - x[0], a[1] + share * uy - x[1]);
-}
-
 // circles first, they are cheap
 static bool check_shapes_overlap(const check_shape *a, const check_shape *b) {
     if (hypot(a->centre[0] - b->centre[0], a->centre[1] - b->centre[1]) >= a->radius + b->radius)
@@ -327,7 +328,7 @@ static bool check_shapes_overlap(const check_shape *a, const check_shape *b) {
     if (b->n_point == 0) {
         bool near = silt_polygon_contains(a->n_point, a->point, b->centre);
         for (int i = 0; i < a->n_point && !near; i++)
-            near = check_distance(a->point + 3 * i, a->point + 3 * ((i + 1) % a->n_point), b->centre) < b->radius;
+            near = silt_segment_distance(a->point + 3 * i, a->point + 3 * ((i + 1) % a->n_point), b->centre) < b->radius;
         return near;
     }
     for (int i = 0; i < a->n_point; i++)
@@ -420,6 +421,58 @@ static void check_bodies(silt_reader *reader, const silt_scene *scene) {
     free(span);
 }
 
+// grains that fill regions -----------------------------------------------------------------------------
+/** what they keep clear of */
+typedef struct check_clear {
+    const silt_scene *scene;
+    check_shape *body; // owned, one per body
+} check_clear;
+
+// from the wall's elements, and not inside of an obstacle; where surfaces from files lie is not known here
+static bool clear_of_wall(const silt_scene *scene, const silt_wall *wall, const double *x, double radius) {
+    if (wall->form == WALL_BOX && scene->dimension == 3) {
+        for (int k = 0; k < 3; k++)
+            if (x[k] - wall->lo[k] < radius || wall->hi[k] - x[k] < radius)
+                return false;
+        return true;
+    }
+    const int n = wall->n_point;
+    for (int i = 0; i + 1 < n + wall->closed; i++)
+        if (silt_segment_distance(wall->point + 3 * i, wall->point + 3 * ((i + 1) % n), x) < radius)
+            return false;
+    return !wall->closed || silt_polygon_area(n, wall->point) > 0 || !silt_polygon_contains(n, wall->point, x);
+}
+
+static bool check_clear_at(const void *context, const double *x, double radius) {
+    const check_clear *clear = context;
+    const silt_scene *scene = clear->scene;
+    const double reach = radius * (1 - 1e-9); // touching is allowed
+    for (int i = 0; i < scene->n_wall; i++)
+        if (!clear_of_wall(scene, &scene->wall[i], x, reach))
+            return false;
+    for (int i = 0; i < scene->bed.n_region; i++)
+        if (silt_region_depth(&scene->bed.region[i], x) > -reach)
+            return false;
+    const check_shape grain = {.centre = {x[0], x[1]}, .radius = reach};
+    for (int i = 0; i < scene->n_body; i++)
+        if (check_shapes_overlap(&clear->body[i], &grain))
+            return false;
+    return true;
+}
+
+// what all keys are sound for
+static void check_fill(silt_reader *reader, silt_scene *scene) {
+    if (reader->n_complaint > 0 || scene->grains.n_fill == 0)
+        return;
+    check_clear clear = {scene, silt_alloc((size_t)scene->n_body + 1, sizeof *clear.body)};
+    for (int i = 0; i < scene->n_body; i++)
+        clear.body[i] = check_shape_make(&scene->body[i]);
+    silt_scene_fill(reader, scene, check_clear_at, &clear);
+    for (int i = 0; i < scene->n_body; i++)
+        free(clear.body[i].point);
+    free(clear.body);
+}
+
 // columns of history.csv -------------------------------------------------------------------------------
 typedef struct check_column {
     char name[64];
@@ -460,6 +513,9 @@ static const char *const check_fixed[] = {"step",
                                           "released_mass",
                                           "deposited_mass",
                                           "pore_water_mass",
+                                          "bed_shear",
+                                          "bed_work",
+                                          "bed_y_plus",
                                           "seepage",
                                           "seepage_volume",
                                           "seepage_lost",
@@ -736,4 +792,5 @@ void silt_scene_check(silt_reader *reader, silt_scene *scene) {
     check_names(reader, scene, column, n);
     check_checks(reader, scene, column, n);
     free(column);
+    check_fill(reader, scene);
 }
