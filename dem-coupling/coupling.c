@@ -140,12 +140,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         c->exchange.gravity[k] = scene->gravity[k];
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
-    c->wall = silt_alloc((size_t)c->walls->count + 1, sizeof *c->wall);
-    for (int i = 0; i < c->walls->count; i++)
-        for (int k = 0; k < 2; k++) {
-            c->wall[i][k] = c->walls->from[i][k];
-            c->wall[i][2 + k] = c->walls->to[i][k];
-        }
+    silt_coupling_walls(c);
     c->dem_def = (silt_dem_def){
         .worker = def->worker,
         .log = def->log,
@@ -162,6 +157,9 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .step = c->step,
         .n_wall = c->walls->count,
         .wall = (const double(*)[4])c->wall,
+        .wall_motion = c->wall_motion,
+        .n_motion = c->n_motion,
+        .motion = (const double(*)[2])c->pivot,
         .max_radius = largest,
         .min_radius = smallest,
         .no_contacts = !scene->bed.on || !scene->bed.deposition,
@@ -374,8 +372,7 @@ static bool coupling_find(silt_coupling *c, const silt_nodes *nodes, const silt_
         memcpy(to->spin, g->omega, sizeof to->spin);
         to->gyration = sqrt(0.4) * g->radius;
         to->held = g->fixed;
-        to->force[0] = to->force[1] = 0.0;
-        memset(to->torque, 0, sizeof to->torque);
+        memset(to->force, 0, sizeof to->force);
         to->cell = coupling_locate(c, g, nodes, mesh, &located, to->weight);
         c->wet = c->wet || to->cell >= 0;
     }
@@ -503,6 +500,8 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     c->n_drop = 0;
     coupling_add(c);
     c->elapsed = n * c->step;
+    if (n > 0)
+        silt_coupling_walls_go(c, n);
     return silt_dem_start(c->dem, n, c->force, c->body_force, c->body_torque, err);
 }
 
@@ -578,6 +577,8 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
     const silt_dem_state *state = silt_dem_state_now(c->dem);
     SILT_TRY(coupling_complete(c, state, err));
     c->contact[0] = c->contact[1] = 0.0;
+    if (c->elapsed > 0.0)
+        silt_coupling_walls_stand(c);
     coupling_touched(c);
     for (int i = 0, k = 0; i < c->n_grain; i++) {
         coupling_grain *g = &c->grain[i];
@@ -676,8 +677,7 @@ static void coupling_listed(silt_coupling *c) {
         g->diameter = def->diameter;
         g->number = 1.0 / c->width;
         g->fixed = coupling_fixes(c, g->id);
-        if (g->fixed)
-            memset(g->v, 0, sizeof g->v);
+        memset(g->v, 0, g->fixed ? sizeof g->v : 0);
     }
 }
 
@@ -717,7 +717,8 @@ static void coupling_close(silt_coupling **coupling) {
     coupling_view *w = c->view;
     void *owned[] = {w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
-                     c->body,     c->body_force, c->body_torque, c->force, c->add, c->torque};
+                     c->body,     c->body_force, c->body_torque, c->force, c->add,    c->torque,
+                     c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);

@@ -23,6 +23,9 @@ typedef struct silt_dem_def {
     int n_wall;
     const double (
         *wall)[4];     // from_x, from_y, to_x, to_y: straight walls, infinitely deep in z, contact from both sides
+    const int *wall_motion; // per wall: which of the motions it follows, -1: stands still; NULL: all do
+    int n_motion;
+    const double (*motion)[2]; // m, what each motion turns about, at its present place
     double max_radius; // m, largest sphere that will ever come (neighbour cut-off)
     double min_radius;
     bool no_contacts; // contacts and on_bed of the state are not asked for (ten thousand grains: 0.4 ms a run)
@@ -83,6 +86,9 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
                            const double *body_torque, silt_error *err);
 /** Torques on the grains in the next run, 3 per grain in the order of the last state, N m; borrowed until then */
 void silt_dem_twist(silt_dem *dem, const double *torque);
+/** How the walls that move do so in the next runs, as stiff pieces: 3 numbers per motion, velocity in m/s and spin in rad/s; and where
+ * they stand at the end of the next run, 4 numbers per wall as in the definition. */
+void silt_dem_move_walls(silt_dem *dem, const double (*rate)[3], const double (*wall)[4]);
 /** The next run may go on from where the last one ended, with its neighbour lists and without a set-up. A run is set up all the
  * same when there are edits or free bodies, and after a save or load. How the lists came about decides the order of sums: the
  * same bits come again only when set-ups come at the same steps again. */

@@ -186,24 +186,21 @@ static void script_strip(FILE *file, const dem_shared *s, const double w[4]) {
     }
 }
 
-static void script_walls(void *lmp, const dem_shared *s, int *plane) {
-    const double(*wall)[4] = (const double(*)[4])DEM_SECTION(s, const double, wall);
-    char path[128];
-    FILE *file = NULL;
+// the walls' file: LIGGGHTS reads it at once
+static void script_wall_path(char path[128]) {
+    snprintf(path, 128, "%s/silt-dem-%d.stl", access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp", (int)getpid());
+}
 
-    snprintf(path, sizeof path, "%s/silt-dem-%d.stl", access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp",
-             (int)getpid());
-    int n_plane = 0;
+// All walls with this motion (-1: those that stand still and are no planes) as one surface of triangles in the file.
+// @return false: there are none
+static bool script_surface(const dem_shared *s, int motion, int *plane, const char *path) {
+    const double(*wall)[4] = (const double(*)[4])DEM_SECTION(s, const double, wall);
+    const int *moves = DEM_SECTION(s, const int, wall_motion);
+    FILE *file = NULL;
     for (int i = 0; i < s->n_wall; i++) {
-        int across = script_plane(s, i);
-        plane[i] = across >= 0;
-        if (across >= 0) {
-            script_say(lmp, "fix wp%d all wall/gran %s primitive type %d %cplane %.17g", i, script_law(s),
-                       DEM_TYPE_WALL, across ? 'y' : 'x', wall[i][across]);
-            n_plane++;
-            continue;
-        }
         double w[4];
+        if (moves[i] != motion || plane[i] == 1)
+            continue;
         memcpy(w, wall[i], sizeof w);
         if (!script_clip(s, w)) {
             plane[i] = -1;
@@ -220,12 +217,78 @@ static void script_walls(void *lmp, const dem_shared *s, int *plane) {
     if (file) {
         fprintf(file, "endsolid walls\n");
         script_file_close(file);
+    }
+    return file != NULL;
+}
+
+// Walls that move are surfaces of their own. First the way of what they turn about, then the turn: its point goes along.
+// @param names  out, of the surfaces. @return how many there are
+static int script_moving(void *lmp, const dem_shared *s, int *plane, FILE *names) {
+    int there = 0;
+    const dem_motion *motion = DEM_SECTION(s, const dem_motion, motion);
+    char path[128];
+    script_wall_path(path);
+    if (s->n_motion)
+        script_say(lmp, "variable still equal 0");
+    script_motion(lmp, s);
+    for (int m = 0; m < s->n_motion; m++) {
+        if (!script_surface(s, m, plane, path))
+            continue;
+        script_say(lmp, "fix wm%d all mesh/surface file %s type %d", m, path, DEM_TYPE_WALL);
+        unlink(path);
+        script_say(lmp, "fix wv%d all move/mesh mesh wm%d linear/variable v_x%d v_y%d v_still", m, m, m, m);
+        script_say(lmp, "fix wt%d all move/mesh mesh wm%d rotate/variable origin %.17g %.17g 0 axis 0 0 1 omega v_w%d", m, m,
+                   motion[m].centre[0], motion[m].centre[1], m);
+        there++;
+        fprintf(names, " wm%d", m);
+    }
+    return there;
+}
+
+// LIGGGHTS knows variables by their place in its list, and puts one that is given anew at the end: all of them are, in the same order
+void script_motion(void *lmp, const dem_shared *s) {
+    const dem_motion *motion = DEM_SECTION(s, const dem_motion, motion);
+    for (int m = 0; m < s->n_motion; m++) {
+        script_say(lmp, "variable x%d equal %.17g", m, motion[m].velocity[0]);
+        script_say(lmp, "variable y%d equal %.17g", m, motion[m].velocity[1]);
+        script_say(lmp, "variable w%d equal %.17g", m, motion[m].spin);
+    }
+}
+
+static void script_walls(void *lmp, const dem_shared *s, int *plane) {
+    const double(*wall)[4] = (const double(*)[4])DEM_SECTION(s, const double, wall);
+    const int *moves = DEM_SECTION(s, const int, wall_motion);
+    char path[128];
+    script_wall_path(path);
+    int n_plane = 0;
+    for (int i = 0; i < s->n_wall; i++) {
+        int across = moves[i] < 0 ? script_plane(s, i) : -1;
+        plane[i] = across >= 0;
+        if (across >= 0) {
+            script_say(lmp, "fix wp%d all wall/gran %s primitive type %d %cplane %.17g", i, script_law(s),
+                       DEM_TYPE_WALL, across ? 'y' : 'x', wall[i][across]);
+            n_plane++;
+        }
+    }
+    // all surfaces belong to one fix: LIGGGHTS allows no second one
+    char *names = NULL;
+    size_t size = 0;
+    FILE *list = open_memstream(&names, &size);
+    if (!list)
+        abort();
+    int n_surface = script_surface(s, -1, plane, path);
+    if (n_surface) {
         script_say(lmp, "fix wm all mesh/surface file %s type %d", path, DEM_TYPE_WALL);
         unlink(path);
-        script_say(lmp, "fix ww all wall/gran %s mesh n_meshes 1 meshes wm", script_law(s));
+        fprintf(list, " wm");
     }
+    n_surface += script_moving(lmp, s, plane, list);
+    fclose(list);
+    if (n_surface)
+        script_say(lmp, "fix ww all wall/gran %s mesh n_meshes %d meshes%s", script_law(s), n_surface, names);
+    free(names);
     // LIGGGHTS insists that type 1 is in use: a plane far away
-    if (!file && !n_plane)
+    if (!n_surface && !n_plane)
         script_say(lmp, "fix wp all wall/gran %s primitive type %d yplane %.17g", script_law(s), DEM_TYPE_WALL,
                    s->lo[1] - 10 * (s->hi[1] - s->lo[1]) - 10 * s->max_radius);
 }

@@ -51,7 +51,14 @@ struct silt_coupling {
     const silt_walls *walls; // borrowed
     silt_dem *dem;           // owned
     silt_dem_def dem_def;    // what it was opened with; its strings are borrowed
-    double (*wall)[4];       // owned
+    double (*wall)[4];       // owned, where LIGGGHTS has them
+    int *wall_motion;        // owned, per wall: which of the motions it follows, -1: none
+    int n_motion;
+    int *moving;             // owned, per motion: the scene's wall
+    double (*centre)[3];     // owned, per motion: where LIGGGHTS has it, m and rad
+    double (*towards)[3];    // owned, where it has it after the substeps
+    double (*pivot)[2];      // owned, centre without the angle
+    double (*rate)[3];       // owned, m/s and rad/s
     double width;            // m, accounting width: spheres stand for what is in this width of the slab
     double step;             // s, of the discrete elements
     double parcel;           // m, usual radius of a parcel, 0 without bed
@@ -85,9 +92,9 @@ struct silt_coupling {
     silt_error refused; // why a release cannot be; returned by the next start
 };
 
-/** grains.fixed holds the grain with this id: it is one of those of the start, which come first */
+/** the scene holds the grain with this id where it is: one of those of the start, whose ids come first */
 static inline bool coupling_fixes(const silt_coupling *c, int64_t id) {
-    return c->scene->grains.fixed && id <= silt_scene_grains(c->scene);
+    return id <= silt_scene_grains(c->scene) && silt_scene_grain(c->scene, (int)id - 1)->fixed;
 }
 
 /** mass of the sphere over the mass that it stands for in the slab: 1, more for a crumb; forces on it are scaled alike, so that it
@@ -99,6 +106,11 @@ double silt_coupling_burden(const silt_coupling *coupling, const coupling_grain 
 void silt_coupling_hold(silt_coupling *coupling, coupling_grain *grain);
 /** The water's torques on grains for the next substeps; nothing where grains.rotational_drag is off. */
 void silt_coupling_twist(silt_coupling *coupling);
+// walls.c
+void silt_coupling_walls(silt_coupling *coupling);       /**< which of them move, and where all are */
+void silt_coupling_walls_stand(silt_coupling *coupling); /**< where the walls are now is where LIGGGHTS has them */
+/** from where LIGGGHTS has the walls that move to where they are at the end of the step, in n substeps */
+void silt_coupling_walls_go(silt_coupling *coupling, int n);
 
 /** Grains, frozen spheres, bodies and counters to and from the store, under "coupling/"; all that is saved was sent.
  * Errors (SILT_FAILED): an array that is absent or has another length, naming it. */

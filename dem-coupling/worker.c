@@ -492,8 +492,10 @@ static void worker_run(void) {
         script_add(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
     if (s->n_remove || s->n_add || worker.n_body || !s->keep)
         worker.settled = 0;
-    if (s->n_step > 0)
+    if (s->n_step > 0) {
         worker_load();
+        script_motion(worker.lmp, s);
+    }
     // the multisphere bodies' sums of forces cannot be reached: they are set up for every run (ten thousand grains: 5 ms)
     if (!worker.settled && (s->n_step > 0 || s->n_remove || s->n_add))
         worker_set_up();

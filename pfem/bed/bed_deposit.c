@@ -172,15 +172,15 @@ static void growth_commit(silt_bed *bed, const silt_scene *scene, const bed_grow
     double left = mass;
     for (int k = 0; k + 1 < growth->n; k++) {
         const int a = growth->node[k], b = growth->node[k + 1];
-        const int cell = silt_bed_cell_add(bed, a, b, deposit->node, 0);
+        const int cell = silt_bed_cell_add(bed, (int[3]){a, b, deposit->node}, 0);
         // shared by area; the last cell takes what rounding left
         bed->mass[cell] = k + 2 < growth->n ? mass * (bed->area[cell] / growth->area) : left;
         left -= bed->mass[cell];
         deposit->cell[deposit->n_cell++] = cell;
-        silt_bed_edge_remove(bed, a, b);
+        silt_bed_edge_remove(bed, (int[3]){a, b, -1});
     }
-    silt_bed_edge_add(bed, scene, growth->node[0], deposit->node);
-    silt_bed_edge_add(bed, scene, deposit->node, growth->node[growth->n - 1]);
+    silt_bed_edge_add(bed, scene, (int[3]){growth->node[0], deposit->node, -1});
+    silt_bed_edge_add(bed, scene, (int[3]){deposit->node, growth->node[growth->n - 1], -1});
     silt_bed_refresh(bed);
     // what lies under the new cells is surface no more
     for (int k = 0; k < growth->n; k++)
@@ -192,7 +192,7 @@ static void growth_commit(silt_bed *bed, const silt_scene *scene, const bed_grow
     bed->pore_water -= deposit->pore_water;
 }
 
-silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const double x[2], double r, double mass,
+silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass,
                                    silt_deposit *deposit) {
     *deposit = (silt_deposit){.kind = DEPOSIT_REFUSED, .node = -1};
     if (!(mass > 0) || bed->n_edge == 0)
@@ -228,7 +228,7 @@ silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const
         }
 
     // no room for a cell: into the pores of the one under the edge
-    const int cell = silt_bed_cell_at(bed, bed->edge[below][1], bed->edge[below][0]);
+    const int cell = silt_bed_cell_at(bed, bed->edge[below]);
     if (1 - (bed->mass[cell] + mass) / scene->bed.density / bed->area[cell] < 0.2)
         return deposit->kind;
     bed->mass[cell] += mass;

@@ -24,7 +24,7 @@ silt_status silt_gauges_create(silt_gauges **gauges, const silt_view *start, sil
     g->start = silt_alloc((size_t)g->n_gauge + 1, sizeof *g->start);
     for (int i = 0; i < g->n_gauge; i++) {
         const silt_gauge_def *def = &start->scene->gauge[i];
-        g->start[i] = def->kind == GAUGE_SCOUR && start->bed ? silt_bed_level(start->bed, def->from[0]) : NAN;
+        g->start[i] = def->kind == GAUGE_SCOUR && start->bed ? silt_bed_level(start->bed, def->from) : NAN;
     }
     *gauges = g;
     return SILT_OK;
@@ -563,7 +563,7 @@ void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value)
         for (int k = 0; k < n; k++)
             value[k] = NAN;
         if (def->kind == GAUGE_BED_LEVEL || def->kind == GAUGE_SCOUR) {
-            double level = view->bed ? silt_bed_level(view->bed, def->from[0]) : -HUGE_VAL;
+            double level = view->bed ? silt_bed_level(view->bed, def->from) : -HUGE_VAL;
             if (level > -HUGE_VAL)
                 value[0] = def->kind == GAUGE_SCOUR ? gauges->start[i] - level : level;
         } else if (def->kind == GAUGE_GRAINS) {

@@ -170,23 +170,36 @@ typedef struct silt_fluid_def {
     silt_formula velocity; // initial
 } silt_fluid_def;
 
-typedef enum { BED_FRICTIONAL_WORK = 0, BED_DISSIPATION } silt_bed_law;
+typedef enum { BED_FRICTIONAL_WORK = 1, BED_DISSIPATION, BED_POWER, BED_EXCESS_SHEAR, BED_SHIELDS } silt_bed_law;
+typedef enum { SHEAR_DEFAULT = 0, SHEAR_PAPER, SHEAR_GRADIENT, SHEAR_LOG_LAW } silt_bed_shear;
 typedef struct silt_bed_def {
     bool on;
     double density;   // kg/m3 of the grains' solid, required
     double porosity;  // required
-    double work;      // J/m3, W_c, required; .inf: never erodes
-    silt_bed_law law; // law: frictional-work | dissipation
-    double distance;  // m, h_k, where the law frictional-work samples the velocity; default fluid.size
+    silt_bed_law law; // law: frictional-work | dissipation | power | excess-shear | shields
+    double work;      // J/m3, W_c of the first three laws, required; .inf: never erodes
+    double erodibility; // m3/(N s), k_d of excess-shear, required
+    double critical;  // critical Shields number of the law shields; 0: Soulsby and Whitehouse
+    silt_bed_shear shear; // how the stress on the bed is found; after reading never default
+    double distance;  // m, h_k, where shear: paper samples the velocity; default fluid.size
+    double roughness; // m, k_s of shear: log-law and of the wall law on the bed; 0: 2.5 grains.diameter
     double size;      // m, spacing of the bed's nodes; default fluid.size
     double layer;     // m, layer thickness h_0 that one W_c removes; 0: the patch height
-    double threshold; // Pa, shear stress below which no work is done; default 0
+    double threshold; // Pa, tau_c, shear stress below which nothing wears; default 0; of shields: from critical
+    double repose;    // degrees, angle of repose; 0: a bed that stands at any slope
+    bool slope;       // default true: with repose, the threshold hangs on the slope
+    bool cover;       // default true: what resting parcels cover does not wear
     double saturation; // share of the pores that holds water, default 1
     bool deposition;   // default true
     silt_condition condition; // of water on the bed, default no-slip
     int n_region;
     silt_region *region; // owned
 } silt_bed_def;
+
+/** true where water can wear the bed */
+static inline bool silt_bed_erodes(const silt_bed_def *bed) {
+    return bed->on && (bed->law > BED_POWER || isfinite(bed->work));
+}
 
 typedef enum {
     DRAG_NONE = 0,
@@ -206,6 +219,7 @@ typedef struct silt_grain_def {
     double at[3], velocity[3];
     double diameter; // m
     double density;  // kg/m3
+    bool fixed;      // held where it is, default false
 } silt_grain_def;
 typedef enum { ARRANGE_RANDOM = 0, ARRANGE_LATTICE } silt_arrangement;
 /** a region full of grains at the start (fill.c) */
@@ -219,6 +233,7 @@ typedef struct silt_fill_def {
     int count;          // grains; 0: not given
     silt_arrangement arrangement;
     int seed;
+    bool fixed; // its grains are held where they are, default false
 } silt_fill_def;
 typedef struct silt_grains_def {
     bool on;              // true when the block is there; bodies alone need contact properties too: see contact
@@ -231,7 +246,6 @@ typedef struct silt_grains_def {
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false
     bool rotational_drag; // torque on the spin, default false
-    bool fixed;           // the grains of the start are held where they are, default false
     int n_grain;
     silt_grain_def *grain; // owned; key `list`
     int n_fill;
@@ -393,6 +407,10 @@ silt_status silt_series_rising(const silt_series *series, silt_error *err);
 static inline int silt_scene_grains(const silt_scene *s) { return s->grains.n_grain + s->grains.n_filled; }
 static inline const silt_grain_def *silt_scene_grain(const silt_scene *s, int i) {
     return i < s->grains.n_grain ? &s->grains.grain[i] : &s->grains.filled[i - s->grains.n_grain];
+}
+/** m, k_s of the bed */
+static inline double silt_bed_roughness(const silt_scene *s) {
+    return s->bed.roughness > 0 ? s->bed.roughness : 2.5 * s->grains.diameter;
 }
 
 /** what a scene needs */

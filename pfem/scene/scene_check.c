@@ -15,7 +15,7 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     bool has_bodies = scene->n_body > 0;
     if (scene->dimension == 3) {
         // the others were refused already
-        bed = grains = bodies = NULL;
+        grains = bodies = NULL;
         if (!fluid)
             silt_complain(
                 reader, root,
@@ -24,9 +24,10 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
                       "one of fluid, grains, bodies");
-    if (bed && !grains)
+    const bool fixed = isinf(scene->bed.work) && !grains; // a bed that gives nothing needs no grains
+    if (bed && !grains && !fixed)
         silt_complain_key(reader, bed,
-                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}: "
+                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}, or with work: .inf: "
                           "eroded bed becomes grains");
     if (bed && scene->grains.on && !silt_tree_item(grains, "parcel"))
         silt_complain_key(reader, grains,
@@ -36,7 +37,7 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         silt_complain(reader, silt_tree_item(grains, "parcel"),
                       "key 'grains.parcel': found 0, allowed a number in m, > 0: "
                       "the bed's parcels need a diameter");
-    const silt_tree *first = bed ? bed : grains ? grains : has_bodies ? bodies : NULL;
+    const silt_tree *first = bed && !fixed ? bed : grains ? grains : has_bodies ? bodies : NULL;
     if (first && !silt_tree_item(root, "contact"))
         silt_complain_key(reader, first,
                           "key '%s': found it without contact properties, allowed with a block contact "
@@ -489,6 +490,9 @@ static const char *const check_fixed[] = {"step",
                                           "released_mass",
                                           "deposited_mass",
                                           "pore_water_mass",
+                                          "bed_shear",
+                                          "bed_work",
+                                          "bed_y_plus",
                                           "grain_count",
                                           "grain_mass",
                                           "grain_velocity_x",
