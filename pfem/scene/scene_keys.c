@@ -409,6 +409,7 @@ static const silt_key grain_rows[] = {
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_grain_def, velocity), .doc = "at the start"},
     {"diameter", KEY_NUMBER, .unit = "m", POSITIVE, AT(silt_grain_def, diameter), .doc = "of this grain"},
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_grain_def, density), .doc = "of its solid"},
+    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_grain_def, fixed), .doc = "it is held where it is, at rest; others touch it"},
     {0}};
 TABLE(grain, "a grain", silt_grain_def, -1);
 
@@ -431,6 +432,7 @@ static const silt_key fill_rows[] = {
             "from below; denser packings come by letting grains settle"},
     {"seed", KEY_INTEGER, .fallback = "1", RANGE(0, INT32_MAX), AT(silt_fill_def, seed),
      .doc = "of the random places: the same places for the same seed"},
+    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_fill_def, fixed), .doc = "its grains are held where they are, at rest: a packed bed"},
     {0}};
 TABLE(fill, "a region of grains", silt_fill_def, offsetof(silt_fill_def, region.kind));
 
@@ -451,8 +453,6 @@ static const silt_key grains_rows[] = {
      .doc = "force of the water's viscous stress on the grain's volume"},
     {"rotational_drag", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, rotational_drag),
      .doc = "torque of the water on grains that spin otherwise than it does"},
-    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, fixed),
-     .doc = "grains that are there from the start stay where they are: a packed bed"},
     {"list", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &grain_table, MANY(silt_grains_def, n_grain, grain),
      .doc = "grains that are there from the start"},
     {"regions", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &fill_table, MANY(silt_grains_def, n_fill, fill),
