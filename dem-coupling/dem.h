@@ -18,6 +18,7 @@ typedef struct silt_dem_def {
     double lo[2], hi[2]; // the box in x and y; a sphere that leaves it is gone
     double period;       // m, periodic length in z (at least 3 times the largest sphere's diameter)
     double gravity[3];
+    double wall_modulus; // Pa, of the walls; 0: youngs_modulus
     double youngs_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
     double step; // s, DEM time step, fixed for the run
     int n_wall;

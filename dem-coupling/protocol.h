@@ -57,7 +57,7 @@ typedef struct dem_shared {
     uint64_t size; // bytes of the memory file; the worker maps again when it grew
     // the numbers of silt_dem_def
     double lo[2], hi[2], period, gravity[2];
-    double youngs_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
+    double youngs_modulus, wall_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
     double step, max_radius, min_radius;
     int resume, no_contacts;
     // lengths of the sections
