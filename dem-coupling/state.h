@@ -32,9 +32,9 @@ typedef struct coupling_grain {
 typedef struct coupling_view {
     silt_grain_state state;
     bool fresh; // shows the grains as they are
-    int capacity[9], map_capacity;
+    int capacity[10], map_capacity;
     int64_t *id;
-    double *x, *v, *omega, *radius, *mass, *net;
+    double *x, *v, *omega, *radius, *mass, *net, *contact;
     int *contacts, *map; // map: index into the grains
     uint8_t *on_bed;
 } coupling_view;
@@ -94,9 +94,9 @@ struct silt_coupling {
     silt_error refused; // why a release cannot be; returned by the next start
 };
 
-/** grains.fixed holds the grain with this id: it is one of those of the start, which come first */
+/** the scene holds the grain with this id where it is: one of those of the start, whose ids come first */
 static inline bool coupling_fixes(const silt_coupling *c, int64_t id) {
-    return c->scene->grains.fixed && id <= silt_scene_grains(c->scene);
+    return id <= silt_scene_grains(c->scene) && silt_scene_grain(c->scene, (int)id - 1)->fixed;
 }
 
 /** mass of the sphere over the mass that it stands for in the slab: 1, more for a crumb; forces on it are scaled alike, so that it
