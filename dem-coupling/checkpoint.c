@@ -1,7 +1,7 @@
 // checkpoint.c: what the coupling knows, as named arrays in the store
 #include "state.h"
 
-enum { GRAIN_DOUBLES = 21, FROZEN_DOUBLES = 7, BODY_DOUBLES = 22 };
+enum { GRAIN_DOUBLES = 23, FROZEN_DOUBLES = 7, BODY_DOUBLES = 22 };
 
 // one row of numbers per grain, sphere or body, filled or read in one place
 static void checkpoint_copy(bool out, double **row, double *value, int n) {
@@ -16,8 +16,8 @@ static void checkpoint_grain_row(bool out, double *row, coupling_grain *g) {
     double *one[] = {&g->radius, &g->mass, &g->solid, &g->diameter, &g->number, &g->net};
     for (int k = 0; k < 6; k++)
         checkpoint_copy(out, &row, one[k], 1);
-    checkpoint_copy(out, &row, g->force, 2);
-    checkpoint_copy(out, &row, g->contact, 2);
+    checkpoint_copy(out, &row, g->force, 3);
+    checkpoint_copy(out, &row, g->contact, 3);
     double last[2] = {g->contacts, g->on_bed};
     checkpoint_copy(out, &row, last, 2);
     g->contacts = (int)last[0];
@@ -118,6 +118,8 @@ silt_status silt_checkpoint_save(silt_coupling *c, silt_store *store, silt_error
     silt_status status = silt_store_put(store, "coupling/number", STORE_LONG, 5, r.number, err);
     if (status == SILT_OK)
         status = checkpoint_rows_store(&r, true, store, err);
+    if (status == SILT_OK && c->n_motion > 0)
+        status = silt_store_put(store, "coupling/wall", STORE_DOUBLE, 3 * (size_t)c->n_motion, c->centre, err);
     checkpoint_rows_clear(&r);
     return status;
 }
@@ -130,13 +132,17 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
                          (long long)r.number[2], c->bodies->count);
     checkpoint_rows_create(&r);
     silt_status status = checkpoint_rows_store(&r, false, store, err);
+    if (status == SILT_OK && c->n_motion > 0)
+        status = silt_store_take(store, "coupling/wall", STORE_DOUBLE, 3 * (size_t)c->n_motion, c->towards, err);
     if (status != SILT_OK)
         goto done;
+    silt_coupling_walls_stand(c);
 
     c->next_id = r.number[3];
     c->left_count = r.number[4];
     c->left_mass = r.left;
-    c->n_grain = c->n_last = (int)r.number[0];
+    c->n_grain = (int)r.number[0];
+    c->n_last = 0;
     c->sent_id = r.number[3];
     c->frozen.count = (int)r.number[1];
     SILT_RESERVE(c->grain, c->grain_capacity, c->n_grain);
@@ -146,7 +152,9 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     for (int i = 0; i < c->n_grain; i++) {
         c->grain[i].sent = true;
         c->grain[i].near = -1;
-        c->last[i] = c->grain[i].id;
+        c->grain[i].fixed = coupling_fixes(c, c->grain[i].id);
+        if (!c->grain[i].fixed)
+            c->last[c->n_last++] = c->grain[i].id;
     }
     for (int i = 0; i < c->frozen.count; i++)
         c->frozen.sphere[i].sent = true;

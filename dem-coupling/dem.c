@@ -1,5 +1,6 @@
 #include "dem.h"
 
+#include "dem_check.h"
 #include "link.h"
 
 // a body as it was given, with what its pose is measured from
@@ -27,6 +28,8 @@ struct silt_dem {
     int n_remove, cap_remove, n_add, cap_add;
     int64_t *remove;      // owned
     silt_dem_sphere *add; // owned
+    const double *torque; // borrowed, of the next run, NULL: none
+    double (*rate)[4]; // owned, velocity and spin of every motion
     int n_solid, cap_solid, n_free, n_free_sphere;
     dem_solid *solid; // owned
     // the last state, owned
@@ -57,13 +60,6 @@ bool silt_dem_own_fault(const silt_dem *dem) {
     return !dem->link.failed || dem->link.gave_up;
 }
 
-static bool dem_finite(int n, const double *value) {
-    for (int i = 0; i < n; i++)
-        if (!isfinite(value[i]))
-            return false;
-    return true;
-}
-
 // ---- opening and closing
 
 void silt_dem_close(silt_dem **dem) {
@@ -73,69 +69,19 @@ void silt_dem_close(silt_dem **dem) {
     dem_link_close(&d->link);
     for (int k = 0; k < d->n_solid; k++)
         free((void *)d->solid[k].def.sphere);
-    void *owned[] = {(void *)d->def.worker,
-                     (void *)d->def.log,
-                     (void *)d->def.wall,
-                     d->live,
-                     d->remove,
-                     d->add,
-                     d->solid,
-                     d->id,
-                     d->x,
-                     d->v,
-                     d->omega,
-                     d->radius,
-                     d->mass,
-                     d->contacts,
-                     d->on_bed,
-                     d->body_x,
-                     d->body_v,
-                     d->body_omega,
-                     d->body_q};
+    void *owned[] = {(void *)d->def.worker, (void *)d->def.log, (void *)d->def.wall, (void *)d->def.triangle, (void *)d->def.wall_motion,
+                     (void *)d->def.motion, d->rate, d->live, d->remove, d->add, d->solid, d->id, d->x, d->v, d->omega,
+                     d->radius, d->mass, d->contacts, d->on_bed, d->body_x, d->body_v, d->body_omega, d->body_q};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
     free(d);
     *dem = NULL;
 }
 
-static silt_status dem_check(const silt_dem_def *def, silt_error *err) {
-    const double number[] = {def->lo[0],
-                             def->lo[1],
-                             def->hi[0],
-                             def->hi[1],
-                             def->gravity[0],
-                             def->gravity[1],
-                             def->rolling_friction,
-                             def->friction,
-                             def->body_friction};
-    const double positive[] = {def->hi[0] - def->lo[0], def->hi[1] - def->lo[1], def->period,
-                               def->youngs_modulus,     def->restitution,        def->step,
-                               def->min_radius,         def->max_radius};
-    static const char *const name[] = {"box width",   "box height", "period",          "Young's modulus",
-                                       "restitution", "time step",  "smallest radius", "largest radius"};
-    if (!dem_finite(9, number))
-        return silt_fail(err, SILT_FAILED, "discrete elements: the box, gravity or a friction is not a finite number");
-    for (int k = 0; k < 8; k++)
-        if (!(positive[k] > 0) || !isfinite(positive[k]))
-            return silt_fail(err, SILT_FAILED, "discrete elements: the %s is %g, it must be above 0", name[k],
-                             positive[k]);
-    if (def->restitution < 0.05 || def->restitution > 1)
-        return silt_fail(err, SILT_FAILED, "discrete elements: the restitution is %g, LIGGGHTS allows 0.05 to 1",
-                         def->restitution);
-    if (def->period < 6 * def->max_radius * (1 - 1e-12))
-        return silt_fail(err, SILT_FAILED,
-                         "discrete elements: the period %g m must be at least 3 diameters of the largest sphere, %g m",
-                         def->period, 6 * def->max_radius);
-    for (int k = 0; k < def->n_wall; k++)
-        if (!dem_finite(4, def->wall[k]))
-            return silt_fail(err, SILT_FAILED, "discrete elements: wall %d is not finite", k);
-    return SILT_OK;
-}
-
 // a worker that runs, not yet LIGGGHTS in it
 static silt_status dem_create(silt_dem **dem, const silt_dem_def *def, bool append, silt_error *err) {
     *dem = NULL;
-    SILT_TRY(dem_check(def, err));
+    SILT_TRY(silt_dem_check(def, err));
     silt_dem *d = silt_alloc(1, sizeof *d);
     d->def = *def;
     d->def.worker = silt_text("%s", def->worker ? def->worker : "silt-dem");
@@ -144,6 +90,20 @@ static silt_status dem_create(silt_dem **dem, const silt_dem_def *def, bool appe
     if (def->n_wall)
         memcpy(wall, def->wall, (size_t)def->n_wall * sizeof *wall);
     d->def.wall = (const double(*)[4])wall;
+    double(*triangle)[10] = silt_alloc((size_t)def->n_triangle + 1, sizeof *triangle);
+    if (def->n_triangle)
+        memcpy(triangle, def->triangle, (size_t)def->n_triangle * sizeof *triangle);
+    d->def.triangle = (const double(*)[10])triangle;
+    const int n_wall = def->n_wall + def->n_triangle;
+    int *moves = silt_alloc((size_t)n_wall + 1, sizeof *moves);
+    for (int k = 0; k < n_wall; k++)
+        moves[k] = def->wall_motion ? def->wall_motion[k] : -1;
+    d->def.wall_motion = moves;
+    double(*motion)[3] = silt_alloc((size_t)def->n_motion + 1, sizeof *motion);
+    if (def->n_motion)
+        memcpy(motion, def->motion, (size_t)def->n_motion * sizeof *motion);
+    d->def.motion = (const double(*)[3])motion;
+    d->rate = silt_alloc((size_t)def->n_motion + 1, sizeof *d->rate);
     d->last_id = INT64_MIN;
     d->next_tag = 1;
     silt_status status = dem_link_open(&d->link, d->def.worker, d->def.log, append, err);
@@ -152,6 +112,29 @@ static silt_status dem_create(silt_dem **dem, const silt_dem_def *def, bool appe
     else
         silt_dem_close(&d);
     return status;
+}
+
+// where the walls are, and how they move
+static void dem_write_walls(const silt_dem *dem) {
+    const silt_dem_def *def = &dem->def;
+    dem_shared *s = dem->link.shared;
+    dem_motion *motion = DEM_SECTION(s, dem_motion, motion);
+    memcpy(DEM_SECTION(s, double, wall), def->wall, (size_t)def->n_wall * sizeof *def->wall);
+    memcpy(DEM_SECTION(s, double, triangle), def->triangle, (size_t)def->n_triangle * sizeof *def->triangle);
+    memcpy(DEM_SECTION(s, int, wall_motion), def->wall_motion, (size_t)(def->n_wall + def->n_triangle) * sizeof *def->wall_motion);
+    for (int k = 0; k < def->n_motion; k++) {
+        memcpy(motion[k].centre, def->motion[k], sizeof motion[k].centre);
+        memcpy(motion[k].velocity, dem->rate[k], sizeof motion[k].velocity);
+        motion[k].spin = dem->rate[k][3];
+    }
+}
+
+void silt_dem_move_walls(silt_dem *dem, const double (*rate)[4], const double *wall) {
+    memcpy(dem->rate, rate, (size_t)dem->def.n_motion * sizeof *dem->rate);
+    if (dem->def.dim == 3)
+        memcpy((double(*)[10])(uintptr_t)dem->def.triangle, wall, (size_t)dem->def.n_triangle * sizeof *dem->def.triangle);
+    else
+        memcpy((double(*)[4])(uintptr_t)dem->def.wall, wall, (size_t)dem->def.n_wall * sizeof *dem->def.wall);
 }
 
 // the fixed numbers into the shared memory, the free bodies if asked; then LIGGGHTS starts
@@ -163,8 +146,11 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     memcpy(s->lo, def->lo, sizeof s->lo);
     memcpy(s->hi, def->hi, sizeof s->hi);
     memcpy(s->gravity, def->gravity, sizeof s->gravity);
+    s->dim = def->dim == 3 ? 3 : 2;
+    s->periodic = def->periodic;
     s->period = def->period;
     s->youngs_modulus = def->youngs_modulus;
+    s->wall_modulus = def->wall_modulus > 0 ? def->wall_modulus : def->youngs_modulus;
     s->poissons_ratio = def->poissons_ratio;
     s->restitution = def->restitution;
     s->friction = def->friction;
@@ -174,14 +160,16 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->max_radius = def->max_radius;
     s->min_radius = def->min_radius;
     s->n_wall = def->n_wall;
+    s->n_triangle = def->n_triangle;
+    s->n_motion = def->n_motion;
     s->no_contacts = def->no_contacts;
     s->n_body = bodies ? dem->n_free : 0;
     s->n_body_sphere = bodies ? dem->n_free_sphere : 0;
-    s->n_remove = s->n_add = s->n_force = 0;
+    s->n_remove = s->n_add = s->n_force = s->n_torque = 0;
     s->max_grain = max_grain;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
-    memcpy(DEM_SECTION(s, double, wall), def->wall, (size_t)def->n_wall * sizeof *def->wall);
+    dem_write_walls(dem);
     double *sphere = DEM_SECTION(s, double, body_sphere);
     int first = 0;
     for (int k = 0; bodies && k < dem->n_solid; k++) {
@@ -287,7 +275,7 @@ silt_status silt_dem_add_body(silt_dem *dem, const silt_dem_body *body, silt_err
     if (dem->begun)
         return silt_fail(err, SILT_FAILED, "rigid body %d was added after the first run; bodies come before it",
                          dem->n_solid);
-    if (body->n_sphere < 1 || !dem_finite(8, number) || !dem_finite(3 * body->n_sphere, body->sphere) ||
+    if (body->n_sphere < 1 || !silt_dem_finite(8, number) || !silt_dem_finite(3 * body->n_sphere, body->sphere) ||
         (!body->fixed && (body->mass <= 0 || body->inertia <= 0)))
         return silt_fail(err, SILT_FAILED,
                          "rigid body %d: %d spheres, mass %g kg, inertia %g kg m2; at least one sphere and positive "
@@ -349,10 +337,10 @@ static silt_status dem_take(silt_dem *dem, silt_error *err) {
             continue;
         if (here) {
             const dem_grain *g = &grain[row];
-            if (!dem_finite(3, g->x) || !dem_finite(3, g->v) || !dem_finite(3, g->omega)) {
+            if (!silt_dem_finite(3, g->x) || !silt_dem_finite(3, g->v) || !silt_dem_finite(3, g->omega)) {
                 return dem_link_give_up(&dem->link, err,
-                                        "grain %lld is not finite after the run: x (%g, %g), v (%g, %g)",
-                                        (long long)live->id, g->x[0], g->x[1], g->v[0], g->v[1]);
+                                        "grain %lld is not finite after the run: x %s, v %s", (long long)live->id,
+                                        silt_dem_place(&dem->def, g->x).text, silt_dem_place(&dem->def, g->v).text);
             }
             dem->id[row] = live->id;
             memcpy(&dem->x[3 * row], g->x, sizeof g->x);
@@ -377,8 +365,8 @@ static silt_status dem_take(silt_dem *dem, silt_error *err) {
             continue;
         const dem_body *b = &body[solid->slot];
         const double *last = &dem->body_x[3 * k];
-        if (!b->present || !dem_finite(3, b->x) || !dem_finite(3, b->v) || !dem_finite(3, b->omega) ||
-            !dem_finite(3, b->axis)) {
+        if (!b->present || !silt_dem_finite(3, b->x) || !silt_dem_finite(3, b->v) || !silt_dem_finite(3, b->omega) ||
+            !silt_dem_finite(3, b->axis)) {
             return dem_link_give_up(&dem->link, err, "rigid body %d %s; it was last at (%g, %g)", k,
                                     b->present ? "is not finite after the run"
                                                : "has left the box of the discrete elements",
@@ -412,17 +400,20 @@ static silt_status dem_check_add(const silt_dem *dem, silt_error *err) {
             return silt_fail(err, SILT_FAILED,
                              "sphere %lld was added after sphere %lld; ids must rise and are used once", id,
                              (long long)last);
-        if (!dem_finite(2, a->x) || !dem_finite(2, a->v) || !isfinite(a->omega[2]))
-            return silt_fail(err, SILT_FAILED, "sphere %lld is not finite: x (%g, %g), v (%g, %g), omega %g", id,
-                             a->x[0], a->x[1], a->v[0], a->v[1], a->omega[2]);
+        if (!silt_dem_finite(3, a->x) || !silt_dem_finite(3, a->v) || !silt_dem_finite(3, a->omega))
+            return silt_fail(err, SILT_FAILED, "sphere %lld is not finite: x %s, v %s, omega (%g, %g, %g)", id,
+                             silt_dem_place(&dem->def, a->x).text, silt_dem_place(&dem->def, a->v).text, a->omega[0], a->omega[1], a->omega[2]);
         if (!(a->radius > 0) || a->radius > def->max_radius * (1 + 1e-12) || !(a->density > 0) || !isfinite(a->density))
             return silt_fail(
                 err, SILT_FAILED,
                 "sphere %lld has radius %g m and density %g kg/m3; the radius must be above 0 and at most %g m", id,
                 a->radius, a->density, def->max_radius);
-        if (a->x[0] < def->lo[0] || a->x[0] >= def->hi[0] || a->x[1] < def->lo[1] || a->x[1] >= def->hi[1])
-            return silt_fail(err, SILT_FAILED, "sphere %lld at (%g, %g) lies outside the box (%g, %g) to (%g, %g)", id,
-                             a->x[0], a->x[1], def->lo[0], def->lo[1], def->hi[0], def->hi[1]);
+        bool outside = false;
+        for (int d = 0; d < (def->dim == 3 ? 3 : 2); d++)
+            outside |= a->x[d] < def->lo[d] || a->x[d] >= def->hi[d];
+        if (outside)
+            return silt_fail(err, SILT_FAILED, "sphere %lld at %s lies outside the box %s to %s", id, silt_dem_place(&dem->def, a->x).text,
+                             silt_dem_place(&dem->def, def->lo).text, silt_dem_place(&dem->def, def->hi).text);
         last = a->id;
     }
     return SILT_OK;
@@ -431,11 +422,11 @@ static silt_status dem_check_add(const silt_dem *dem, silt_error *err) {
 static silt_status dem_check_load(const silt_dem *dem, const double *force, const double *body_force,
                                   const double *body_torque, silt_error *err) {
     for (int k = 0; force && k < dem->state.n_grain; k++)
-        if (!dem_finite(3, &force[3 * k]))
-            return silt_fail(err, SILT_FAILED, "the force on grain %lld at (%g, %g) is not finite: (%g, %g)",
-                             (long long)dem->id[k], dem->x[3 * k], dem->x[3 * k + 1], force[3 * k], force[3 * k + 1]);
+        if (!silt_dem_finite(3, &force[3 * k]))
+            return silt_fail(err, SILT_FAILED, "the force on grain %lld at %s is not finite: %s", (long long)dem->id[k],
+                             silt_dem_place(&dem->def, &dem->x[3 * k]).text, silt_dem_place(&dem->def, &force[3 * k]).text);
     for (int k = 0; k < dem->n_solid; k++)
-        if ((body_force && !dem_finite(3, &body_force[3 * k])) || (body_torque && !dem_finite(3, &body_torque[3 * k])))
+        if ((body_force && !silt_dem_finite(3, &body_force[3 * k])) || (body_torque && !silt_dem_finite(3, &body_torque[3 * k])))
             return silt_fail(err, SILT_FAILED, "the force or torque on rigid body %d at (%g, %g) is not finite", k,
                              dem->body_x[3 * k], dem->body_x[3 * k + 1]);
     return SILT_OK;
@@ -535,13 +526,19 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     s->n_remove = dem->n_remove;
     s->n_add = dem->n_add + n_fixed;
     s->n_force = force ? dem->state.n_grain : 0;
+    s->n_torque = dem->torque ? dem->state.n_grain : 0;
     s->max_grain = n_grain + dem->n_add;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
     dem_write_edits(dem, first);
+    if (dem->def.n_motion)
+        dem_write_walls(dem);
     // the layout may have moved: walls and bodies stand before what changes length
     if (force)
         memcpy(DEM_SECTION(s, double, force), force, 3 * (size_t)dem->state.n_grain * sizeof(double));
+    if (dem->torque)
+        memcpy(DEM_SECTION(s, double, torque), dem->torque, 3 * (size_t)s->n_torque * sizeof(double));
+    dem->torque = NULL;
     for (int k = 0; k < dem->n_solid; k++) {
         if (dem->solid[k].slot < 0)
             continue;
@@ -553,6 +550,8 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     }
     return dem_link_send(&dem->link, DEM_RUN, err);
 }
+
+void silt_dem_twist(silt_dem *dem, const double *torque) { dem->torque = torque; }
 
 void silt_dem_keep(silt_dem *dem) {
     dem->keep = true;

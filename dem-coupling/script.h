@@ -9,7 +9,8 @@
 #include <stdbool.h>
 
 /** Box, materials, contact law, gravity, walls, fluid forces; from the restart file when shared->resume. plane[i] is
- * set to 1 when wall i became an infinite plane, 0 when it is a mesh, -1 when it lies outside the box. */
+ * set to 1 when wall i became an infinite plane, 0 when it is a mesh, -1 when it lies outside the box; triangles count on after
+ * the walls. */
 void script_open(void *lmp, const dem_shared *shared, const char *restart, int *plane);
 /** Templates of the free bodies and the integrator of spheres and bodies. @param file path of a scratch file, fd its
  * descriptor */
@@ -22,6 +23,8 @@ void script_delete(void *lmp);
 void script_add(void *lmp, const dem_shared *shared, const char *file, int fd);
 /** neighbours, contact forces and applied forces anew; nothing moves, nothing is added to the contacts' history */
 void script_set_up(void *lmp, const dem_shared *shared);
+/** velocities and spins of the walls that move, for the runs to come */
+void script_motion(void *lmp, const dem_shared *shared);
 /** n_step substeps, the first with the forces of the last set-up; every run has its own set-up before: impulses are
  * exact, and a restarted worker gives the same bits */
 void script_run(void *lmp, int n_step);

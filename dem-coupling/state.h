@@ -17,22 +17,24 @@ typedef struct coupling_grain {
     double x[3], v[3], omega[3];
     double radius, mass, solid; // m, kg/m, m3/m
     double diameter, number;    // for drag: m, grains per metre of width
-    double force[2];            // N/m, the water's
-    double contact[2], net;     // N/m, of the last step
-    double old_x[2], old_v[2];  // before the substeps
+    double force[3];            // N/m, the water's
+    double torque[3];           // N m/m, the water's, where it is asked for
+    double contact[3], net;     // N/m, of the last step
+    double old_x[3], old_v[3];  // before the substeps
     int contacts;
     int near; // a node of the water next to it when it was last located, -1: none
     uint8_t on_bed;
     bool sent, gone; // LIGGGHTS has it; it was deposited or left
+    bool fixed;      // held where it is: frozen for LIGGGHTS
 } coupling_grain;
 
 /** what grains() shows: borrowed by the caller, remade when it is stale */
 typedef struct coupling_view {
     silt_grain_state state;
     bool fresh; // shows the grains as they are
-    int capacity[9], map_capacity;
+    int capacity[10], map_capacity;
     int64_t *id;
-    double *x, *v, *omega, *radius, *mass, *net;
+    double *x, *v, *omega, *radius, *mass, *net, *contact;
     int *contacts, *map; // map: index into the grains
     uint8_t *on_bed;
 } coupling_view;
@@ -49,8 +51,17 @@ struct silt_coupling {
     const silt_walls *walls; // borrowed
     silt_dem *dem;           // owned
     silt_dem_def dem_def;    // what it was opened with; its strings are borrowed
-    double (*wall)[4];       // owned
-    double width;            // m, accounting width: spheres stand for what is in this width of the slab
+    int dim;                 // of the scene
+    double (*wall)[4];       // owned, plane: where LIGGGHTS has them
+    double (*triangle)[10];  // owned, space: the same, see dem.h
+    int *wall_motion;        // owned, per wall: which of the motions it follows, -1: none
+    int n_motion;
+    int *moving;             // owned, per motion: the scene's wall
+    double (*centre)[4];     // owned, per motion: where LIGGGHTS has it, m and rad
+    double (*towards)[4];    // owned, where it has it after the substeps
+    double (*pivot)[3];      // owned, centre without the angle
+    double (*rate)[4];       // owned, m/s and rad/s
+    double width;            // m, accounting width: spheres stand for what is in this width of the slab; 1 in space
     double step;             // s, of the discrete elements
     double parcel;           // m, usual radius of a parcel, 0 without bed
     double crust;            // m, radius of the frozen spheres along the bed
@@ -72,15 +83,38 @@ struct silt_coupling {
     coupling_body *body;              // owned, as many as in the scene
     silt_body_state *bodies;          // owned
     double *body_force, *body_torque; // owned, 3 per body, N and N m of the slab
-    int force_capacity, add_capacity;
+    int force_capacity, torque_capacity, add_capacity;
     double *force;        // owned, 3 per grain, N
+    double *torque;       // owned, 3 per grain, N m; NULL where the water exerts none
     silt_dem_sphere *add; // owned
     double elapsed;       // s, of the running substeps
-    double contact[2];    // N/m, of contacts on all grains, of the last substeps
+    double contact[3];    // N/m, of contacts on all grains, of the last substeps
     double left_mass;
     int64_t left_count;
     silt_error refused; // why a release cannot be; returned by the next start
 };
+
+/** the scene holds the grain with this id where it is: one of those of the start, whose ids come first */
+static inline bool coupling_fixes(const silt_coupling *c, int64_t id) {
+    return id <= silt_scene_grains(c->scene) && silt_scene_grain(c->scene, (int)id - 1)->fixed;
+}
+
+/** mass of the sphere over the mass that it stands for in the slab: 1, more for a crumb; forces on it are scaled alike, so that it
+ * moves as the crumb would */
+double silt_coupling_burden(const silt_coupling *coupling, const coupling_grain *grain);
+
+// walk.c
+/** What holds a fixed grain against water and weight counts as contact. */
+void silt_coupling_hold(silt_coupling *coupling, coupling_grain *grain);
+/** The water's torques on grains for the next substeps; nothing where grains.rotational_drag is off. */
+void silt_coupling_twist(silt_coupling *coupling);
+/** true when the way from a to b leads over an outlet out of the water, or a is within `near` of one */
+bool silt_coupling_leaves(const silt_coupling *coupling, const double *a, const double *b, double near);
+// walls.c
+void silt_coupling_walls(silt_coupling *coupling);       /**< which of them move, and where all are */
+void silt_coupling_walls_stand(silt_coupling *coupling); /**< where the walls are now is where LIGGGHTS has them */
+/** from where LIGGGHTS has the walls that move to where they are at the end of the step, in n substeps */
+void silt_coupling_walls_go(silt_coupling *coupling, int n);
 
 /** Grains, frozen spheres, bodies and counters to and from the store, under "coupling/"; all that is saved was sent.
  * Errors (SILT_FAILED): an array that is absent or has another length, naming it. */

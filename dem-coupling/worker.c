@@ -33,7 +33,7 @@ static struct {
     pid_t parent;
     void *lmp;
     int scratch; // descriptor of a memory file for what LIGGGHTS reads
-    int *plane;  // owned, one per wall, see script_open
+    int *plane;  // owned, one per wall and triangle, see script_open
     int *row;    // owned, local index by tag, -1: not here
     int n_row;
     int *order; // owned, tags of the last answer
@@ -184,7 +184,7 @@ static const char *worker_path(int fd) {
 // ---- LIGGGHTS' arrays
 typedef struct worker_atoms {
     int n, *tag, *type;
-    double **x, **v, **omega, **force, *radius, *mass;
+    double **x, **v, **omega, **force, **torque, *radius, *mass;
 } worker_atoms;
 
 static worker_atoms worker_look(void) {
@@ -195,6 +195,7 @@ static worker_atoms worker_look(void) {
                       .v = lammps_extract_atom(worker.lmp, "v"),
                       .omega = lammps_extract_atom(worker.lmp, "omega"),
                       .force = lammps_extract_atom(worker.lmp, "f"),
+                      .torque = lammps_extract_atom(worker.lmp, "torque"),
                       .radius = lammps_extract_atom(worker.lmp, "radius"),
                       .mass = lammps_extract_atom(worker.lmp, "rmass")};
     return a;
@@ -232,9 +233,9 @@ static void worker_flatten(const worker_atoms *a) {
 
 static void worker_check(const worker_atoms *a, const char *when) {
     for (int i = 0; i < a->n; i++)
-        if (!isfinite(a->x[i][0] + a->x[i][1] + a->v[i][0] + a->v[i][1] + a->omega[i][2]))
-            worker_fail("a sphere of type %d is not finite %s: x (%g, %g), v (%g, %g), omega %g", a->type[i], when,
-                        a->x[i][0], a->x[i][1], a->v[i][0], a->v[i][1], a->omega[i][2]);
+        if (!isfinite(a->x[i][0] + a->x[i][1] + a->x[i][2] + a->v[i][0] + a->v[i][1] + a->v[i][2] + a->omega[i][2]))
+            worker_fail("a sphere of type %d is not finite %s: x (%g, %g, %g), v (%g, %g, %g), omega_z %g", a->type[i], when, a->x[i][0],
+                        a->x[i][1], a->x[i][2], a->v[i][0], a->v[i][1], a->v[i][2], a->omega[i][2]);
 }
 
 // ---- the answer: state of grains and bodies
@@ -352,7 +353,7 @@ static void worker_open(void) {
     lammps_open(4, argument, MPI_COMM_WORLD, &worker.lmp);
     if (!worker.lmp)
         worker_fail("LIGGGHTS does not start");
-    worker.plane = worker_grow(worker.plane, (size_t)s->n_wall, sizeof *worker.plane);
+    worker.plane = worker_grow(worker.plane, (size_t)(s->n_wall + s->n_triangle), sizeof *worker.plane);
     script_open(worker.lmp, s, worker_path(DEM_FD_RESTART), worker.plane);
     if (s->resume) {
         worker_body_table();
@@ -390,28 +391,33 @@ static void worker_bodies(void) {
 static void worker_load(void) {
     dem_shared *s = worker.shared;
     worker_atoms a = worker_look();
-    const double *force = DEM_SECTION(s, const double, force);
+    const double *force = DEM_SECTION(s, const double, force), *torque = DEM_SECTION(s, const double, torque);
     const dem_body *body = DEM_SECTION(s, const dem_body, body);
     double **f = lammps_extract_fix(worker.lmp, "dragforce", 1, 2, 0, 0),
            **t = lammps_extract_fix(worker.lmp, "hdtorque", 1, 2, 0, 0);
 
     worker_index(&a);
-    worker_flatten(&a);
+    if (s->dim == 2)
+        worker_flatten(&a);
     worker_check(&a, "before the run");
     for (int i = 0; i < a.n; i++) {
-        for (int c = 0; c < 2; c++)
+        for (int c = 0; c < s->dim; c++)
             a.force[i][c] -= f[i][c];
+        for (int c = s->dim == 3 ? 0 : 2; c < 3 && a.type[i] == DEM_TYPE_GRAIN; c++)
+            a.torque[i][c] -= t[i][c];
         memset(f[i], 0, 3 * sizeof(double)), memset(t[i], 0, 3 * sizeof(double));
     }
     for (int k = 0; k < s->n_force && k < worker.n_order; k++) {
         int i = worker_find(worker.order[k]);
         if (i >= 0 && a.type[i] == DEM_TYPE_GRAIN)
-            memcpy(f[i], &force[3 * k], 2 * sizeof(double));
+            memcpy(f[i], &force[3 * k], (size_t)s->dim * sizeof(double));
+        for (int c = s->dim == 3 ? 0 : 2; c < 3 && i >= 0 && a.type[i] == DEM_TYPE_GRAIN && k < s->n_torque; c++)
+            a.torque[i][c] += t[i][c] = torque[3 * k + c];
     }
     // a run that goes on begins with the sum of forces at the last one's end: the old load goes out of it, the new one comes in
     for (int i = 0; i < a.n; i++)
         if (a.type[i] == DEM_TYPE_GRAIN)
-            for (int c = 0; c < 2; c++)
+            for (int c = 0; c < s->dim; c++)
                 a.force[i][c] += f[i][c];
     // bodies stand where the last answer said
     for (int b = 0; b < worker.n_body; b++) {
@@ -487,8 +493,10 @@ static void worker_run(void) {
         script_add(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
     if (s->n_remove || s->n_add || worker.n_body || !s->keep)
         worker.settled = 0;
-    if (s->n_step > 0)
+    if (s->n_step > 0) {
         worker_load();
+        script_motion(worker.lmp, s);
+    }
     // the multisphere bodies' sums of forces cannot be reached: they are set up for every run (ten thousand grains: 5 ms)
     if (!worker.settled && (s->n_step > 0 || s->n_remove || s->n_add))
         worker_set_up();

@@ -91,7 +91,7 @@ static void test_warn(void **state) {
 static void test_copies(void **state) {
     (void)state;
     static const char *const name[] = {"water.yaml", "space.yaml", "whole.yaml"};
-    static const int files[] = {7, 5, 2}, copies[] = {6, 5, 2};
+    static const int files[] = {7, 5, 3}, copies[] = {6, 5, 3};
     for (int i = 0; i < 3; i++) {
         char path[4096], out[] = SILT_BINARY "/test_model_XXXXXX", command[4096];
         silt_error err = {0};

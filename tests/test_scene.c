@@ -454,6 +454,9 @@ static void same_scene(const silt_scene *a, const silt_scene *b) {
     assert_int_equal(a->grains.n_grain, b->grains.n_grain);
     if (a->grains.n_grain)
         assert_memory_equal(a->grains.grain, b->grains.grain, (size_t)a->grains.n_grain * sizeof *a->grains.grain);
+    assert_int_equal(a->grains.n_filled, b->grains.n_filled);
+    if (a->grains.n_filled)
+        assert_memory_equal(a->grains.filled, b->grains.filled, (size_t)a->grains.n_filled * sizeof *a->grains.filled);
     assert_int_equal(a->n_body, b->n_body);
     for (int i = 0; i < a->n_body; i++) {
         assert_string_equal(a->body[i].name, b->body[i].name);

@@ -207,9 +207,10 @@ KERNEL continuity(const int D, const silt_fluid *f, const silt_mesh *mesh, int e
 
 void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
                               const double *p) {
+    const double *taken = f->seep ? silt_seepage_taken(f, p) : NULL;
     SILT_PARALLEL(f->n_node)
     for (int j = 0; j < f->n_node; j++) {
-        const double asked = -(rate ? rate[j] : 0) - (drag ? drag->source[j] : 0);
+        const double asked = -(rate ? rate[j] : 0) - (drag ? drag->source[j] : 0) + (taken ? taken[j] : 0);
         f->residual[j] = f->mobile[j] == 1 ? asked : 0;
         f->withheld[j] = f->mobile[j] == 1 ? 0 : asked;
     }

@@ -23,8 +23,8 @@ DENSE_INLINE bits lanes_first(int n) {
 
 DENSE_INLINE vector lanes_keep(vector v, bits which) { return (vector)((bits)v & which); }
 
-// out (rows x C, columns `apart` apart) -= a b^T over k columns of a and b, `ld` apart; two vectors of rows
-DENSE_INLINE void product_two(int k, size_t ld, const float *a, const float *b, float *out, size_t apart) {
+// out (rows x C, columns `apart` apart) += sign a b^T, sign 1 or -1, over k columns of a and b, `ld` apart; two vectors of rows
+DENSE_INLINE void product_two(const int sign, int k, size_t ld, const float *a, const float *b, float *out, size_t apart) {
     vector sum[C][2] = {{{0}}};
     for (int c = 0; c < k; c++, a += ld, b += ld) {
         const vector a0 = *(const vector *)a, a1 = *(const vector *)(a + LANES);
@@ -36,13 +36,14 @@ DENSE_INLINE void product_two(int k, size_t ld, const float *a, const float *b, 
     }
 #pragma GCC unroll 8
     for (int j = 0; j < C; j++) {
-        *(vector *)(out + (size_t)j * apart) -= sum[j][0];
-        *(vector *)(out + (size_t)j * apart + LANES) -= sum[j][1];
+        vector *to = (vector *)(out + (size_t)j * apart), *next = (vector *)(out + (size_t)j * apart + LANES);
+        *to = sign < 0 ? *to - sum[j][0] : *to + sum[j][0];
+        *next = sign < 0 ? *next - sum[j][1] : *next + sum[j][1];
     }
 }
 
 // the same for one vector of rows, of which the first `rows` count, and `columns` columns; what does not count is written as it was
-DENSE_INLINE void product_one(int k, size_t ld, const float *a, const float *b, float *out, size_t apart, int rows, int columns) {
+DENSE_INLINE void product_one(const int sign, int k, size_t ld, const float *a, const float *b, float *out, size_t apart, int rows, int columns) {
     const bits which = lanes_first(rows);
     vector sum[C] = {{0}};
     for (int c = 0; c < k; c++, a += ld, b += ld) {
@@ -54,15 +55,15 @@ DENSE_INLINE void product_one(int k, size_t ld, const float *a, const float *b, 
 #pragma GCC unroll 8
     for (int j = 0; j < C; j++)
         if (j < columns)
-            *(vector *)(out + (size_t)j * apart) -= lanes_keep(sum[j], which);
+            *(vector *)(out + (size_t)j * apart) -= lanes_keep(sign < 0 ? sum[j] : -sum[j], which);
 }
 
-DENSE_INLINE void product(int k, size_t ld, const float *a, const float *b, float *out, size_t apart, int rows, int columns) {
+DENSE_INLINE void product(const int sign, int k, size_t ld, const float *a, const float *b, float *out, size_t apart, int rows, int columns) {
     int r = 0;
     for (; r + 2 * LANES <= rows && columns == C; r += 2 * LANES)
-        product_two(k, ld, a + r, b, out + r, apart);
+        product_two(sign, k, ld, a + r, b, out + r, apart);
     for (; r < rows; r += LANES)
-        product_one(k, ld, a + r, b, out + r, apart, rows - r < LANES ? rows - r : LANES, columns);
+        product_one(sign, k, ld, a + r, b, out + r, apart, rows - r < LANES ? rows - r : LANES, columns);
 }
 
 // rows times the inverse of a finished triangle of `columns` columns
@@ -101,15 +102,16 @@ DENSE_INLINE int triangle_factor(int columns, size_t ld, const float *whole, flo
     return -1;
 }
 
-DENSE_CLONES int silt_dense_factor(int own, int wide, const float *whole, float *panel) {
-    const size_t ld = (size_t)wide;
-    for (int begin = 0; begin < own; begin += DEEP) {
-        const int end = begin + DEEP < own ? begin + DEEP : own;
+// columns from `first` to `last` of a panel of `own`, what is before them done
+DENSE_INLINE int columns_factor(int first, int last, int own, size_t ld, const float *whole, float *panel) {
+    const int wide = (int)ld;
+    for (int begin = first; begin < last; begin += DEEP) {
+        const int end = begin + DEEP < last ? begin + DEEP : last;
         const float *done = panel + ld * (size_t)begin;
         for (int at = begin; at < end; at += C) {
             const int columns = end - at < C ? end - at : C;
             float *t = panel + at + ld * (size_t)at;
-            product(at - begin, ld, done + at, done + at, t, ld, wide - at, columns);
+            product(-1, at - begin, ld, done + at, done + at, t, ld, wide - at, columns);
             const int bad = triangle_factor(columns, ld, whole + at, t);
             if (bad >= 0)
                 return at + bad;
@@ -119,21 +121,39 @@ DENSE_CLONES int silt_dense_factor(int own, int wide, const float *whole, float 
                 triangle_rows(columns, ld, t, t + columns, wide - at - columns);
         }
         for (int at = end; at < own; at += C)
-            product(end - begin, ld, done + at, done + at, panel + at + ld * (size_t)at, ld, wide - at, own - at < C ? own - at : C);
+            product(-1, end - begin, ld, done + at, done + at, panel + at + ld * (size_t)at, ld, wide - at, own - at < C ? own - at : C);
     }
     return -1;
 }
 
-DENSE_CLONES void silt_dense_update(int own, int wide, const float *panel, float *update) {
+DENSE_CLONES int silt_dense_factor(int own, int negative, int wide, const float *whole, float *panel) {
+    const size_t ld = (size_t)wide;
+    const int positive = own - negative, bad = columns_factor(0, positive, own, ld, whole, panel);
+    if (bad >= 0 || !negative)
+        return bad;
+    for (int j = positive; j < own; j++)
+        for (int r = j; r < wide; r++)
+            panel[r + ld * (size_t)j] *= -1;
+    return columns_factor(positive, own, own, ld, whole, panel);
+}
+
+// update += sign L21 L21^T of the columns from `first` to `last`
+DENSE_INLINE void columns_update(const int sign, int first, int last, int own, int wide, const float *panel, float *update) {
     const size_t ld = (size_t)wide;
     const int rest = wide - own;
-    for (int begin = 0; begin < own; begin += 2 * DEEP) {
-        const int deep = own - begin < 2 * DEEP ? own - begin : 2 * DEEP;
+    for (int begin = first; begin < last; begin += 2 * DEEP) {
+        const int deep = last - begin < 2 * DEEP ? last - begin : 2 * DEEP;
         const float *below = panel + own + ld * (size_t)begin;
         for (int at = 0; at < rest; at += C)
-            product(deep, ld, below + at, below + at, update + at + (size_t)at * (size_t)rest, (size_t)rest, rest - at,
+            product(sign, deep, ld, below + at, below + at, update + at + (size_t)at * (size_t)rest, (size_t)rest, rest - at,
                     rest - at < C ? rest - at : C);
     }
+}
+
+DENSE_CLONES void silt_dense_update(int own, int negative, int wide, const float *panel, float *update) {
+    columns_update(-1, 0, own - negative, own, wide, panel, update);
+    if (negative)
+        columns_update(1, own - negative, own, own, wide, panel, update);
 }
 
 DENSE_CLONES void silt_dense_forward(int own, int wide, const float *panel, float *t) {

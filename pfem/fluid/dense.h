@@ -18,10 +18,11 @@
 /** A panel of `wide` rows and `own` columns, lower triangle first: L of its top, L21 of the rest, 1/diagonal in the diagonal's place.
  * @param whole  the matrix's diagonal, of each column; it takes the place of a pivot that is rounding: what is known up to a constant
  * gets it fixed there
- * @return -1, or a column whose pivot is negative, and not by rounding */
-int silt_dense_factor(int own, int wide, const float *whole, float *panel);
-/** update (wide - own rows and columns, lower triangle; above it anything) -= L21 L21^T */
-void silt_dense_update(int own, int wide, const float *panel, float *update);
+ * @param negative  that many columns, the last, have negative pivots: panel = L S L^T, S ones and, for these, minus ones
+ * @return -1, or a column whose pivot has the wrong sign, and not by rounding */
+int silt_dense_factor(int own, int negative, int wide, const float *whole, float *panel);
+/** update (wide - own rows and columns, lower triangle; above it anything) -= L21 S L21^T */
+void silt_dense_update(int own, int negative, int wide, const float *panel, float *update);
 /** t (wide, what is past it is lost) = [L 0; L21 1]^-1 t */
 void silt_dense_forward(int own, int wide, const float *panel, float *t);
 /** t (the first own) = L^-T (t - L21^T rest of t) */

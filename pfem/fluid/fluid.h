@@ -9,6 +9,7 @@
 
 #include "parts.h"
 #include "pocket.h"
+#include "seep.h"
 #include "viscosity.h"
 
 typedef struct silt_pressure silt_pressure; // the pressure matrix and its factor, pressure.c
@@ -24,6 +25,7 @@ typedef struct silt_step {
     const silt_mesh *mesh;
     const silt_drag *drag;       // NULL without grains in the water
     silt_pockets *pockets;       // NULL where air has no pressure
+    silt_seep *seep;             // prepared for this step; NULL where the bed lets no water through
     silt_nodes *nodes;
     double time, dt;             // s, start and length
 } silt_step;
@@ -74,6 +76,7 @@ typedef struct silt_fluid {
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned
     silt_stiff *stiff;    // owned
+    silt_seep *seep;      // the step's
     silt_mix *mix;        // owned
     double theta;         // implicitness of the step: fluid.theta, more where viscosity is stiff
     silt_depth depth;     // owned, distances to walls and surface; empty where viscosity is the same everywhere
@@ -154,7 +157,7 @@ void silt_assemble_viscous_both(const silt_fluid *fluid, const silt_mesh *mesh, 
 void silt_assemble_viscous_diagonal(const silt_fluid *fluid, const silt_mesh *mesh, double *diagonal);
 /** out += (lumped - consistent mass) a */
 void silt_assemble_mass_excess(const silt_fluid *fluid, const silt_mesh *mesh, double density, const double *a, double *out);
-/** residual of continuity, p with the potential of a central force: G^T v + L p + Q pi - source - rate (NULL: 0); where no velocity can mend it, of its smoothing alone */
+/** residual of continuity, p with the potential of a central force: G^T v + L p + Q pi - source - rate (NULL: 0), and what the bed takes; where no velocity can mend it, of its smoothing alone */
 void silt_assemble_continuity(silt_fluid *fluid, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
                               const double *p);
 /** pi = -M^-1 Q^T p: the recovered gradient, lumped, of the pressure with the potential of a central force */
@@ -213,6 +216,18 @@ silt_status silt_pressure_solve_stiff(silt_pressure *pressure, const double *rig
 void silt_pressure_forget(silt_pressure *pressure);
 
 
+// fluid.c
+/** v += P G q/inertia */
+void silt_fluid_correct(silt_fluid *fluid, const silt_step *step, const double *q, double *v);
+
+// seepage.c -----------------------------------------------------------------------------------------------
+/** what the bed takes from each node at the pressure p, m3/s */
+const double *silt_seepage_taken(silt_fluid *fluid, const double *p);
+/** increment = (S + L + B)^-1 right, B what the bed takes of the water for its pressure: conjugate gradients with silt_pressure_solve
+ * before them, to `tolerance` relative to the right side. */
+silt_status silt_seepage_solve(silt_fluid *fluid, const silt_step *step, const double *right, double tolerance, double *increment,
+                               silt_error *err);
+
 // stiff.c -------------------------------------------------------------------------------------------------
 /** Assembles and factors the momentum, or momentum and continuity, of the present geometry and viscosity, 2-D. Makes *stiff at first. */
 silt_status silt_stiff_factor(silt_stiff **stiff, silt_fluid *fluid, const silt_step *step, bool pressure, silt_error *err);
@@ -221,10 +236,9 @@ bool silt_stiff_ready(const silt_stiff *stiff, bool pressure);
 /** the step is over */
 void silt_stiff_end(silt_stiff *stiff);
 /** out = (inertia + K)^-1 right on the free components */
-silt_status silt_stiff_momentum(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *out, silt_error *err);
+void silt_stiff_momentum(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *out);
 /** velocity and pressure that together mend continuity: v += dv, (inertia + K) dv = G increment, G^T dv + L increment = right */
-silt_status silt_stiff_correct(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *increment, double *v,
-                               silt_error *err);
+void silt_stiff_correct(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *increment, double *v);
 void silt_stiff_forget(silt_stiff *stiff);
 void silt_stiff_free(silt_stiff **stiff);
 

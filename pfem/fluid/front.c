@@ -1,352 +1,10 @@
-// nested dissection and fronts
+// fronts: factor and solve
 #include <omp.h>
+#ifdef __SSE__
+#include <xmmintrin.h>
+#endif
 
-#include "dense.h"
-#include "front.h"
-
-// parts of so few nodes are eliminated at one go
-#define FRONT_LEAF 32
-// Subtrees that threads take one by one, and the work (multiplications) below which a subtree is not divided. What does not hang on
-// the number of threads are the bits: every front sums the same in the same order, whoever does it.
-#define BRANCH_MOST 16
-#define BRANCH_WORK 4e6
-
-/** a node on its way through the dissection */
-struct item {
-    double x[2];
-    double reach; // farthest neighbour, along an axis
-    int node;
-};
-
-/** columns that are eliminated together, with the rows below them */
-struct block {
-    int begin, end;  // places in the order
-    int n_child;     // that many blocks before it in the tree
-    int first;       // first block of the subtree that it is the last of
-    int side;        // stack that its update waits on: parents and children take turns, so that none has to move
-    int row_begin, row_end;
-    double work;     // of the subtree, multiplications
-    size_t value;    // of the panel (end - begin columns of own and row_end - row_begin entries)
-};
-
-/** A node of the tree's top, or a subtree that one thread does. Its last block's update waits here for its parent. */
-struct branch {
-    int begin, end;  // blocks; of the top: one
-    int bad;         // node where the matrix is not positive definite, -1
-    bool top;
-    float *update;   // owned, until its parent has it
-    float *give;     // owned, what the subtree adds to the right side at its last block's rows
-    size_t give_capacity;
-};
-
-/** what a thread works with */
-struct worker {
-    float *stack[2];        // owned, updates that wait for their parent; of a factor's time only
-    float **column;         // owned, of the present front
-    int *waiting;           // owned, blocks on the stacks
-    int *local;             // owned, per place: row in the front
-    int *at;                // owned, rows of the front that a star or an update goes to
-    int *run;               // owned, ends of runs among these
-    float *part_right;      // owned, the right side's numbers in a front
-    float *right;           // owned, per place: the right side in a subtree and above it
-    int column_capacity, waiting_capacity, local_capacity, at_capacity, run_capacity, part_capacity, right_capacity;
-};
-
-struct silt_front {
-    int n;
-    int n_block, block_capacity;
-    struct block *block;    // owned, children before their parents
-    int *order, *place;     // owned, node at a place, place of a node
-    int *row;               // owned, places, rising in a block
-    int *first;             // owned, of each star, the lowest place
-    int *local;             // the first worker's; in the dissection: part
-    struct item *item;      // owned, while the order is looked for
-    float *value;           // owned, panels, columns one after the other, 1/diagonal in the diagonal's place
-    float *whole;           // owned, in the order of elimination: the matrix's diagonal
-    float *right;           // owned, in the order of elimination
-    int n_branch;
-    struct branch branch[BRANCH_MOST]; // children before their parents
-    int n_worker;
-    struct worker *worker;  // owned
-    int order_capacity, place_capacity, row_capacity, first_capacity, right_capacity, whole_capacity, worker_capacity;
-    size_t value_capacity, stacked[2]; // most of any subtree
-    int widest; // front
-    int part;
-};
-
-// ---------------------------------------------------------------- order
-
-static int block_add(silt_front *f, int begin, int end, int n_child, int depth) {
-    SILT_RESERVE(f->block, f->block_capacity, f->n_block + 1);
-    f->block[f->n_block++] = (struct block){.begin = begin, .end = end, .n_child = n_child, .side = depth % 2};
-    return 1;
-}
-
-static void swap_items(struct item *a, struct item *b) {
-    const struct item t = *a;
-    *a = *b;
-    *b = t;
-}
-
-#define SEPARATED (-1)
-
-// nodes of a star that lie on both sides of a cut, while its node is none of them: the fewer go to the separator
-static void clear_star(silt_front *f, const silt_front_matrix *q, int w, int low) {
-    int count[2] = {0, 0};
-    for (int k = q->neighbour_start[w]; k < q->neighbour_start[w + 1]; k++) {
-        const int side = f->local[q->neighbour[k]] - low;
-        if (side == 0 || side == 1)
-            count[side]++;
-    }
-    if (!count[0] || !count[1])
-        return;
-    const int fewer = low + (count[1] < count[0]);
-    for (int k = q->neighbour_start[w]; k < q->neighbour_start[w + 1]; k++)
-        if (f->local[q->neighbour[k]] == fewer)
-            f->local[q->neighbour[k]] = SEPARATED;
-}
-
-// what joins the two sides of a cut at `cut`: nodes with a neighbour beyond it, and what a separated node of before joins.
-// Only nodes whose reach crosses the cut are looked at.
-static void separate(silt_front *f, const silt_front_matrix *q, int begin, int end, int axis, double cut, int low) {
-    int n_touch = 0, *touch = f->first; // separated nodes near the cut, and those of this cut
-    for (int k = begin; k < end; k++) {
-        const struct item *t = &f->item[k];
-        if (fabs(t->x[axis] - cut) > t->reach)
-            continue;
-        const int other = 2 * low + 1 - f->local[t->node];
-        bool joined = false, outer = false;
-        for (int m = q->neighbour_start[t->node]; m < q->neighbour_start[t->node + 1]; m++) {
-            const int part = f->local[q->neighbour[m]];
-            joined |= part == other;
-            outer |= part == SEPARATED;
-        }
-        if (joined || outer)
-            touch[n_touch++] = joined ? t->node : ~t->node;
-    }
-    for (int k = 0; k < n_touch; k++)
-        if (touch[k] >= 0)
-            f->local[touch[k]] = SEPARATED;
-    for (int k = 0; k < n_touch; k++) {
-        const int i = touch[k] < 0 ? ~touch[k] : touch[k];
-        for (int m = q->neighbour_start[i]; m < q->neighbour_start[i + 1]; m++)
-            if (f->local[q->neighbour[m]] == SEPARATED)
-                clear_star(f, q, q->neighbour[m], low);
-    }
-}
-
-// orders the items from begin to end. @return how many blocks wait for a parent
-static int dissect(silt_front *f, const silt_front_matrix *q, int begin, int end, int depth) {
-    const int n = end - begin;
-    if (n <= FRONT_LEAF)
-        return n ? block_add(f, begin, end, 0, depth) : 0;
-    double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL}, sum[2] = {0, 0};
-    for (int k = begin; k < end; k++)
-        for (int d = 0; d < 2; d++) {
-            const double x = f->item[k].x[d];
-            lo[d] = x < lo[d] ? x : lo[d];
-            hi[d] = x > hi[d] ? x : hi[d];
-            sum[d] += x;
-        }
-    const int axis = hi[1] - lo[1] > hi[0] - lo[0], low = f->part;
-    const double cut = sum[axis] / n;
-    f->part += 2;
-    int count = 0;
-    for (int k = begin; k < end; k++) {
-        const int side = f->item[k].x[axis] >= cut;
-        f->local[f->item[k].node] = low + side;
-        count += side;
-    }
-    if (count == 0 || count == n)
-        return block_add(f, begin, end, 0, depth);
-    separate(f, q, begin, end, axis, cut, low);
-    // low side, high side, separator
-    int a = begin, b = end, k = begin;
-    while (k < b) {
-        const int part = f->local[f->item[k].node];
-        if (part == low) {
-            if (k != a)
-                swap_items(&f->item[a], &f->item[k]);
-            a++;
-            k++;
-        } else if (part == SEPARATED)
-            swap_items(&f->item[k], &f->item[--b]);
-        else
-            k++;
-    }
-    const int below = depth + (b < end); // without a separator the parts go to this one's parent
-    const int waiting = dissect(f, q, begin, a, below) + dissect(f, q, a, b, below);
-    return b < end ? block_add(f, b, end, waiting, depth) : waiting;
-}
-
-// adds places above the block that the mark has not seen
-static int rows_add(silt_front *f, int count, int begin, int mark, int above, const int *place, int n) {
-    for (int k = 0; k < n; k++)
-        if (place[k] >= above && f->local[place[k]] != mark) {
-            f->local[place[k]] = mark;
-            f->row[begin + count++] = place[k];
-        }
-    return count;
-}
-
-// rows below every block: those that its children hand on, and the stars that begin in it. @return numbers in all panels
-static size_t rows_find(silt_front *f, const silt_front_matrix *q) {
-    const int n = f->n;
-    for (int i = 0; i < n; i++) {
-        int first = n;
-        for (int k = q->neighbour_start[i]; k < q->neighbour_start[i + 1]; k++) {
-            const int place = f->place[q->neighbour[k]];
-            first = place < first ? place : first;
-        }
-        f->first[i] = first;
-        f->local[i] = -1;
-    }
-    int filled = 0;
-    size_t value = 0;
-    f->widest = 0;
-    for (int e = 0; e < f->n_block; e++) {
-        struct block *b = &f->block[e];
-        SILT_RESERVE(f->row, f->row_capacity, filled + (n - b->end) + 1);
-        int count = 0;
-        b->row_begin = filled;
-        b->first = e;
-        b->work = 0;
-        for (int c = 0; c < b->n_child; c++) {
-            const struct block *child = &f->block[b->first - 1];
-            count = rows_add(f, count, filled, e, b->end, f->row + child->row_begin, child->row_end - child->row_begin);
-            b->first = child->first;
-            b->work += child->work;
-        }
-        for (int p = b->begin; p < b->end; p++) {
-            const int u = f->order[p];
-            for (int k = q->neighbour_start[u]; k < q->neighbour_start[u + 1]; k++) {
-                const int i = q->neighbour[k];
-                if (f->first[i] != p)
-                    continue;
-                for (int m = q->neighbour_start[i]; m < q->neighbour_start[i + 1]; m++)
-                    count = rows_add(f, count, filled, e, b->end, &f->place[q->neighbour[m]], 1);
-            }
-        }
-        silt_sort_few(count, f->row + filled);
-        filled += count;
-        b->row_end = filled;
-        b->value = value;
-        const size_t own = (size_t)(b->end - b->begin);
-        value += own * (own + (size_t)count);
-        f->widest = (int)own + count > f->widest ? (int)own + count : f->widest;
-        b->work += (double)own * ((double)own * ((double)own / 3 + count) + (double)count * count);
-    }
-    return value;
-}
-
-// ---------------------------------------------------------------- branches
-
-static void branch_add(silt_front *f, int last) {
-    struct branch *t = &f->branch[f->n_branch++];
-    t->begin = f->block[last].first;
-    t->end = last + 1;
-    t->top = false;
-}
-
-// the heaviest subtree becomes a node of the top, its children subtrees. @return false where that is not worth it
-static bool branch_divide(silt_front *f) {
-    int heaviest = -1;
-    double most = BRANCH_WORK;
-    for (int k = 0; k < f->n_branch; k++) {
-        const struct branch *t = &f->branch[k];
-        if (!t->top && t->end - t->begin > 1 && f->block[t->end - 1].work > most) {
-            most = f->block[t->end - 1].work;
-            heaviest = k;
-        }
-    }
-    if (heaviest < 0 || f->n_branch + f->block[f->branch[heaviest].end - 1].n_child > BRANCH_MOST)
-        return false;
-    struct branch *t = &f->branch[heaviest];
-    int child = t->end - 2;
-    t->begin = t->end - 1;
-    t->top = true;
-    for (int c = 0; c < f->block[t->begin].n_child; c++) {
-        branch_add(f, child);
-        child = f->block[child].first - 1;
-    }
-    return true;
-}
-
-// what waits on the stacks at most while a subtree is done
-static void branch_stacks(silt_front *f, const struct branch *t, int *waiting) {
-    size_t stacked[2] = {0, 0};
-    int n_waiting = 0;
-    for (int e = t->begin; e < t->end - 1; e++) {
-        const struct block *b = &f->block[e];
-        for (int c = 0; c < b->n_child; c++) {
-            const struct block *child = &f->block[waiting[--n_waiting]];
-            const size_t size = (size_t)(child->row_end - child->row_begin);
-            stacked[!b->side] -= size * size;
-        }
-        waiting[n_waiting++] = e;
-        stacked[b->side] += (size_t)(b->row_end - b->row_begin) * (size_t)(b->row_end - b->row_begin);
-        f->stacked[b->side] = stacked[b->side] > f->stacked[b->side] ? stacked[b->side] : f->stacked[b->side];
-    }
-}
-
-static int compare_branches(const void *a, const void *b) {
-    const struct branch *p = a, *q = b;
-    return (p->end > q->end) - (p->end < q->end);
-}
-
-static void branches_find(silt_front *f) {
-    f->n_branch = 0;
-    // trees that no separator joins: the last block is the root of the last one
-    for (int last = f->n_block - 1; last >= 0 && f->n_branch < BRANCH_MOST; last = f->block[last].first - 1)
-        branch_add(f, last);
-    while (branch_divide(f))
-        ;
-    qsort(f->branch, (size_t)f->n_branch, sizeof *f->branch, compare_branches);
-    if (f->n_branch) // more trees than branches: the first one takes the rest
-        f->branch[0].begin = 0;
-    f->stacked[0] = f->stacked[1] = 0;
-    SILT_RESERVE(f->worker->waiting, f->worker->waiting_capacity, f->n_block + 1);
-    for (int k = 0; k < f->n_branch; k++)
-        branch_stacks(f, &f->branch[k], f->worker->waiting);
-}
-
-void silt_front_order(silt_front **front, const silt_front_matrix *q, const double *x) {
-    if (!*front)
-        *front = silt_alloc(1, sizeof **front);
-    silt_front *f = *front;
-    const int n = f->n = q->n;
-    SILT_RESERVE(f->order, f->order_capacity, n + 1);
-    SILT_RESERVE(f->place, f->place_capacity, n + 1);
-    SILT_RESERVE(f->first, f->first_capacity, n + 1);
-    SILT_RESERVE(f->worker, f->worker_capacity, 1);
-    SILT_RESERVE(f->worker->local, f->worker->local_capacity, n + 1);
-    f->local = f->worker->local;
-    f->item = silt_alloc((size_t)n + 1, sizeof *f->item);
-    SILT_RESERVE(f->right, f->right_capacity, n + 1);
-    SILT_RESERVE(f->whole, f->whole_capacity, n + DENSE_PAD);
-    for (int i = 0; i < n; i++) {
-        struct item *t = &f->item[i];
-        *t = (struct item){.x = {x[2 * i], x[2 * i + 1]}, .node = i};
-        for (int k = q->neighbour_start[i]; k < q->neighbour_start[i + 1]; k++)
-            for (int d = 0; d < 2; d++) {
-                const double way = fabs(x[2 * q->neighbour[k] + d] - t->x[d]);
-                t->reach = way > t->reach ? way : t->reach;
-            }
-        t->reach *= 1 + 1e-9;
-        f->local[i] = -2;
-    }
-    f->n_block = f->part = 0;
-    dissect(f, q, 0, n, 0);
-    for (int k = 0; k < n; k++) {
-        f->order[k] = f->item[k].node;
-        f->place[f->order[k]] = k;
-    }
-    free(f->item);
-    f->item = NULL;
-    const size_t value = rows_find(f, q);
-    f->value = silt_room(f->value, &f->value_capacity, value + DENSE_PAD, sizeof(float));
-    branches_find(f);
-}
+#include "front_inside.h"
 
 // ---------------------------------------------------------------- factor
 
@@ -382,6 +40,22 @@ static void assemble(const silt_front *f, struct worker *w, const silt_front_mat
                 if (g[2] != 0)
                     entry_add(column, at[m], own, g[2]);
             }
+        }
+    }
+}
+
+// pairs whose first unknown the block eliminates
+static void assemble_pairs(const silt_front *f, struct worker *w, const silt_front_matrix *q, const struct block *b) {
+    const int m = f->unknowns;
+    for (int p = b->begin; p < b->end; p++) {
+        const int i = f->order[p] / m, c = f->order[p] % m;
+        float *column = w->column[p - b->begin];
+        for (int k = q->neighbour_start[i]; k < q->neighbour_start[i + 1]; k++) {
+            const float *entry = q->pair + (size_t)(m * m) * (size_t)k + m * c;
+            const int *place = f->place + m * q->neighbour[k];
+            for (int r = 0; r < m; r++)
+                if (place[r] >= p)
+                    column[w->local[place[r]]] += entry[r];
         }
     }
 }
@@ -449,7 +123,10 @@ static void branch_factor(silt_front *f, struct worker *w, const silt_front_matr
         const int own = b->end - b->begin, wide = own + b->row_end - b->row_begin;
         float *panel = f->value + b->value, *update = b == last ? t->update : top[b->side];
         columns_clear(f, w, b, panel, update);
-        assemble(f, w, q, b);
+        if (q->pair)
+            assemble_pairs(f, w, q, b);
+        else
+            assemble(f, w, q, b);
         if (t->top)
             t->bad = children_add(f, w, t);
         for (int c = 0; c < b->n_child && !t->top; c++) {
@@ -458,12 +135,12 @@ static void branch_factor(silt_front *f, struct worker *w, const silt_front_matr
             top[!b->side] -= size * size;
             extend_add(f, w, child, top[!b->side]);
         }
-        const int bad = t->bad < 0 ? silt_dense_factor(own, wide, f->whole + b->begin, panel) : -1;
+        const int bad = t->bad < 0 ? silt_dense_factor(own, b->negative, wide, f->whole + b->begin, panel) : -1;
         if (bad >= 0)
-            t->bad = f->order[b->begin + bad];
+            t->bad = f->order[b->begin + bad] / f->unknowns;
         if (t->bad >= 0)
             return;
-        silt_dense_update(own, wide, panel, update);
+        silt_dense_update(own, b->negative, wide, panel, update);
         top[b->side] += (size_t)(wide - own) * (size_t)(wide - own);
         w->waiting[n_waiting++] = e;
     }
@@ -479,9 +156,22 @@ typedef struct pass {
     void (*after)(const struct pass *pass, struct worker *w, struct branch *t);
 } pass;
 
+// What lies far apart couples by numbers that single precision holds as denormal, and a processor works at these many times as long: they
+// are taken for nought (five factors of momenta and saddle points at N = 0.4, 40k nodes: 59 -> 15 us a node).
+static void branch_work(const pass *p, void (*work)(const struct pass *, struct worker *, struct branch *), struct branch *t) {
+#ifdef __SSE__
+    const unsigned mode = _mm_getcsr();
+    _mm_setcsr(mode | _MM_FLUSH_ZERO_ON | 0x40); // 0x40: also where they come in
+#endif
+    work(p, &p->f->worker[omp_get_thread_num()], t);
+#ifdef __SSE__
+    _mm_setcsr(mode);
+#endif
+}
+
 static void branch_pass(const pass *p, struct branch *t) {
     if (p->before)
-        p->before(p, &p->f->worker[omp_get_thread_num()], t);
+        branch_work(p, p->before, t);
     int child = t->end - 2;
     for (int c = 0; t->top && c < p->f->block[t->begin].n_child; c++) {
         struct branch *other = branch_of(p->f, child);
@@ -491,7 +181,7 @@ static void branch_pass(const pass *p, struct branch *t) {
     }
 #pragma omp taskwait
     if (p->after)
-        p->after(p, &p->f->worker[omp_get_thread_num()], t);
+        branch_work(p, p->after, t);
 }
 
 static void all_pass(const pass *p) {
@@ -590,6 +280,8 @@ static void forward_after(const pass *p, struct worker *w, struct branch *t) {
         part_take(f, b, y, part);
         silt_dense_forward(own, own + rest, f->value + b->value, part);
         memcpy(y + b->begin, part, (size_t)own * sizeof *part);
+        for (int r = b->end - b->negative; r < b->end; r++)
+            y[r] = -y[r]; // between L and L^T stand the signs of the pivots
         for (int r = 0; r < rest; r++)
             y[f->row[b->row_begin + r]] = part[own + r];
     }

@@ -19,7 +19,12 @@ typedef struct silt_front_matrix {
     const float *row;       // 3 per neighbour
     const float *weight;    // n
     const double *diagonal; // n
-    const float *whole;     // n, the diagonal of the sum
+    const float *whole;     // the diagonal of the sum, one per unknown
+    // In place of all these: what couples every node with its neighbours, unknowns^2 numbers for each (row by row, those of the node
+    // itself included). Two unknowns, velocities; or three, the last a pressure, whose pivots are negative: the matrix is quasi-definite,
+    // so that every order has a factor L D L^T (Vanderbei, SIAM J. Optim. 5, 1995), here L S L^T with signs S.
+    const float *pair;
+    int unknowns;
     int threads;            // that may work at it, 0 counts as one; the bits do not hang on it
 } silt_front_matrix;
 

@@ -1,24 +1,25 @@
-// stiff viscosity in two dimensions: momentum and continuity are factored as one system, and the momentum alone for
-// its own solver. [A -G; -G^T -L] is symmetric and quasi-definite: every order of elimination has an LDL^T factor
-// (Vanderbei, SIAM J. Optim. 5, 1995).
-// Node by node, the velocities first, with the order of the nodes that suits their graph.
-#include "factor.h"
+// stiff viscosity in two dimensions: the momentum, and momentum and continuity as one system, factored front by front. [A -G; -G^T -L]
+// is symmetric and quasi-definite.
 #include "fluid.h"
+#include "front.h"
+#include "parallel.h"
 
-/** a symmetric matrix with m unknowns a node and its factor */
+/** a symmetric matrix with two or three unknowns a node and its factor */
 typedef struct silt_blocks {
-    int m;
-    bool ready;               // the factor is that of the present step
-    silt_factor factor;       // owned
+    bool ready;               // the factor is one of the present step
+    int64_t revision;         // of the mesh that the order belongs to
+    silt_front *front;        // owned
+    silt_front_matrix matrix;
+    float *pair, *whole;      // owned, see silt_front_matrix
+    int pair_capacity, whole_capacity;
 } silt_blocks;
 
 struct silt_stiff {
     silt_blocks velocity, saddle; // A; with the pressure
-    int64_t revision;             // of the mesh that patterns and factors belong to
-    int n;
-    double *entry;                // owned, (dim + 1)^2 per neighbour
+    double *row;                  // owned, of the present node
+    int *place;                   // owned, per node: where it is in the present node's list
     double *right;                // owned, dim + 1 per node
-    int entry_capacity, right_capacity;
+    int row_capacity, place_capacity, right_capacity;
 };
 
 void silt_stiff_end(silt_stiff *stiff) {
@@ -29,18 +30,24 @@ void silt_stiff_end(silt_stiff *stiff) {
 void silt_stiff_forget(silt_stiff *stiff) {
     if (!stiff)
         return;
-    silt_factor_clear(&stiff->velocity.factor);
-    silt_factor_clear(&stiff->saddle.factor);
-    stiff->revision = -1;
+    stiff->velocity.revision = stiff->saddle.revision = -1;
     silt_stiff_end(stiff);
+}
+
+static void blocks_free(silt_blocks *b) {
+    silt_front_free(&b->front);
+    free(b->pair);
+    free(b->whole);
 }
 
 void silt_stiff_free(silt_stiff **stiff) {
     if (!*stiff)
         return;
     silt_stiff *q = *stiff;
-    silt_stiff_forget(q);
-    free(q->entry);
+    blocks_free(&q->velocity);
+    blocks_free(&q->saddle);
+    free(q->row);
+    free(q->place);
     free(q->right);
     free(q);
     *stiff = NULL;
@@ -50,180 +57,142 @@ bool silt_stiff_ready(const silt_stiff *stiff, bool pressure) {
     return stiff && (pressure ? stiff->saddle.ready : stiff->velocity.ready);
 }
 
-// pattern of m unknowns a node, and the order of elimination from that of the nodes
-static void pattern(silt_blocks *b, const silt_mesh *mesh, int m, const int *order) {
-    const int n = mesh->n_node;
-    b->m = m;
-    int filled = 0;
-    for (int j = 0; j < n; j++)
-        for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++)
-            filled += mesh->neighbour[k] > j ? m * m : mesh->neighbour[k] == j ? m * (m + 1) / 2 : 0;
-    int *start = silt_factor_pattern(&b->factor, m * n, filled), *index = b->factor.index, at = 0;
-    for (int j = 0; j < n; j++)
-        for (int c = 0; c < m; c++) {
-            start[m * j + c] = at;
-            for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
-                const int i = mesh->neighbour[k];
-                for (int r = i == j ? c : 0; r < m && i >= j; r++)
-                    index[at++] = m * i + r;
-            }
-        }
-    start[m * n] = at;
-    int *perm = silt_alloc((size_t)(m * n) + 1, sizeof *perm);
-    for (int k = 0; k < n; k++)
-        for (int c = 0; c < m; c++)
-            perm[m * k + c] = m * order[k] + c;
-    SILT_CLOCKED(analyse, silt_factor_analyse(&b->factor, m == 2 ? FACTOR_DEFINITE : FACTOR_QUASI_DEFINITE, perm));
-    free(perm);
-}
+#define INLINE static inline __attribute__((always_inline))
 
-// order of the nodes by minimum degree
-static int *node_order(const silt_mesh *mesh) {
-    const int n = mesh->n_node;
-    int *start = silt_alloc((size_t)n + 1, sizeof *start), *index = silt_alloc((size_t)mesh->neighbour_start[n] + 1, sizeof *index);
-    silt_mesh_lower(mesh, start, index);
-    int *order;
-    SILT_CLOCKED(analyse, order = silt_factor_order(n, start, index));
-    free(start);
-    free(index);
-    return order;
-}
-
-// [K -G; -G^T -L] of every pair of neighbours, without inertia and without regard to what is held
-static void assemble(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh) {
-    enum { D = 2, M = 3 };
-    memset(q->entry, 0, (size_t)(M * M * mesh->neighbour_start[mesh->n_node]) * sizeof *q->entry);
-    for (int e = 0; e < mesh->n_cell; e++) {
-        const int *cell = mesh->cell[e];
-        const double *flux = f->flux + M * D * e;
+// rows of node i in [K -G; -G^T -L], M unknowns a node, without inertia and without regard to what is held
+INLINE void row_sum(const int M, const silt_fluid *f, const silt_mesh *mesh, int i, const int *place, double *row) {
+    enum { D = 2, N = 3 };
+    for (int k = mesh->node_cell_start[i]; k < mesh->node_cell_start[i + 1]; k++) {
+        const int e = mesh->node_cell[k], *cell = mesh->cell[e], a = cell[0] == i ? 0 : cell[1] == i ? 1 : 2;
+        const double *flux = f->flux + N * D * e, *fa = flux + D * a, *share = f->share ? f->share + N * e : NULL;
         const double viscous = f->mu[e] * f->inverse[e], smooth = f->tau[e] * f->inverse[e];
-        for (int a = 0; a < M; a++)
-            for (int b = 0; b < M; b++) {
-                double *out = q->entry + M * M * silt_neighbour_index(mesh, cell[a], cell[b]);
-                const double *fa = flux + D * a, *fb = flux + D * b, along = fa[0] * fb[0] + fa[1] * fb[1];
-                for (int d = 0; d < D; d++) {
-                    for (int k = 0; k < D; k++)
-                        out[M * d + k] += viscous * ((d == k ? along : 0) + fb[d] * fa[k] - 2.0 / 3 * fa[d] * fb[k]);
-                    out[M * d + D] -= fa[d] / M + (f->share ? f->share[M * e + a] * fb[d] : 0);
-                    out[M * D + d] -= fb[d] / M + (f->share ? f->share[M * e + b] * fa[d] : 0);
-                }
-                out[M * D + D] -= smooth * along;
+        for (int b = 0; b < N; b++) {
+            double *out = row + M * M * place[cell[b]];
+            const double *fb = flux + D * b, along = fa[0] * fb[0] + fa[1] * fb[1];
+            for (int d = 0; d < D; d++)
+                for (int c = 0; c < D; c++)
+                    out[M * d + c] += viscous * ((d == c ? along : 0) + fb[d] * fa[c] - 2.0 / 3 * fa[d] * fb[c]);
+            for (int d = 0; d < D && M > D; d++) {
+                out[M * d + D] -= fa[d] / N + (share ? share[a] * fb[d] : 0);
+                out[M * D + d] -= fb[d] / N + (share ? share[b] * fa[d] : 0);
             }
+            if (M > D)
+                out[M * D + D] -= smooth * along;
+        }
     }
 }
 
 // inertia on the diagonal; held components taken out
-static void hold(silt_stiff *q, const silt_fluid *f, const silt_mesh *mesh, const uint8_t *closed) {
-    enum { D = 2, M = 3 };
-    for (int i = 0; i < q->n; i++) {
-        double own = 0;
-        for (int k = mesh->neighbour_start[i]; k < mesh->neighbour_start[i + 1]; k++) {
-            const int j = mesh->neighbour[k];
-            double *out = q->entry + M * M * k;
-            if (i == j) {
-                own = f->inertia[i] + 0.5 * (out[0] + out[M + 1]);
-                for (int d = 0; d < D; d++)
-                    out[M * d + d] += f->inertia[i];
-                // a crumb between held nodes knows its pressure up to a constant too
-                out[M * D + D] *= closed[i] ? 2 : 1 + 1e-9;
-                if (!mesh->wet[i] || !(out[M * D + D] < 0))
-                    out[M * D + D] = -1;
-            }
-            if (f->hold[i] != HOLD_FREE)
-                for (int c = 0; c < M; c++) { // columns: velocity of row i
-                    double column[3] = {out[c], out[M + c], 0};
-                    silt_hold_project(f, i, column);
-                    out[c] = column[0];
-                    out[M + c] = column[1];
-                }
-            if (f->hold[j] != HOLD_FREE)
-                for (int r = 0; r < M; r++)
-                    silt_hold_project(f, j, out + M * r);
-            if (i == j && f->hold[i] != HOLD_FREE)
-                for (int d = 0; d < D; d++) {
-                    double unit[3] = {d == 0, d == 1, 0}, free_part[3] = {unit[0], unit[1], 0};
-                    silt_hold_project(f, i, free_part);
-                    for (int k2 = 0; k2 < D; k2++)
-                        out[M * k2 + d] += own * (unit[k2] - free_part[k2]);
-                }
+INLINE void row_hold(const int M, const silt_fluid *f, const silt_mesh *mesh, int i, const uint8_t *closed, int self, double *row) {
+    enum { D = 2 };
+    const int start = mesh->neighbour_start[i], size = mesh->neighbour_start[i + 1] - start;
+    double *own = row + M * M * self;
+    const double held = f->inertia[i] + 0.5 * (own[0] + own[M + 1]);
+    for (int d = 0; d < D; d++)
+        own[M * d + d] += f->inertia[i];
+    if (M > D) {
+        // a crumb between held nodes knows its pressure up to a constant too
+        own[M * D + D] *= closed[i] ? 2 : 1 + 1e-9;
+        if (!mesh->wet[i] || !(own[M * D + D] < 0))
+            own[M * D + D] = -1;
+    }
+    for (int k = 0; k < size; k++) {
+        const int j = mesh->neighbour[start + k];
+        double *out = row + M * M * k;
+        for (int c = 0; c < M && f->hold[i] != HOLD_FREE; c++) { // columns: velocity of row i
+            double column[3] = {out[c], out[M + c], 0};
+            silt_hold_project(f, i, column);
+            out[c] = column[0];
+            out[M + c] = column[1];
         }
+        for (int r = 0; r < M && f->hold[j] != HOLD_FREE; r++)
+            silt_hold_project(f, j, out + M * r);
+    }
+    for (int d = 0; d < D && f->hold[i] != HOLD_FREE; d++) {
+        double unit[3] = {d == 0, d == 1, 0}, loose[3] = {unit[0], unit[1], 0};
+        silt_hold_project(f, i, loose);
+        for (int k = 0; k < D; k++)
+            own[M * k + d] += held * (unit[k] - loose[k]);
     }
 }
 
-static void fill(const silt_stiff *q, silt_blocks *b, const silt_mesh *mesh) {
-    const int m = b->m;
-    double *value = b->factor.value;
-    int at = 0;
-    for (int j = 0; j < q->n; j++)
-        for (int c = 0; c < m; c++)
-            for (int k = mesh->neighbour_start[j]; k < mesh->neighbour_start[j + 1]; k++) {
-                const int i = mesh->neighbour[k];
-                for (int r = i == j ? c : 0; r < m && i >= j; r++)
-                    value[at++] = q->entry[9 * k + 3 * c + r]; // block (j, i) is block (i, j) turned over
-            }
+// all rows, in single precision; the diagonal, for the pressure with what velocities will add to it
+INLINE void rows_assemble(const int M, silt_stiff *q, silt_blocks *b, const silt_fluid *f, const silt_mesh *mesh, const uint8_t *closed) {
+    enum { D = 2 };
+    const int n = mesh->n_node;
+    SILT_RESERVE(b->pair, b->pair_capacity, M * M * mesh->neighbour_start[n] + 1);
+    SILT_RESERVE(b->whole, b->whole_capacity, M * n + 1);
+    SILT_RESERVE(q->place, q->place_capacity, n + 1);
+    memset(b->whole, 0, (size_t)(M * n) * sizeof *b->whole);
+    for (int i = 0; i < n; i++) {
+        const int start = mesh->neighbour_start[i], size = mesh->neighbour_start[i + 1] - start;
+        SILT_RESERVE(q->row, q->row_capacity, M * M * size + 1);
+        double *row = q->row;
+        memset(row, 0, (size_t)(M * M * size) * sizeof *row);
+        for (int k = 0; k < size; k++)
+            q->place[mesh->neighbour[start + k]] = k;
+        const int self = q->place[i];
+        row_sum(M, f, mesh, i, q->place, row);
+        row_hold(M, f, mesh, i, closed, self, row);
+        const double *own = row + M * M * self;
+        float *pair = b->pair + (size_t)(M * M) * (size_t)start;
+        for (int k = 0; k < M * M * size; k++)
+            pair[k] = (float)row[k];
+        for (int d = 0; d < M; d++)
+            b->whole[M * i + d] += (float)fabs(own[(M + 1) * d]);
+        for (int k = 0; k < size && M > D; k++)
+            for (int d = 0; d < D; d++)
+                b->whole[M * mesh->neighbour[start + k] + D] += (float)(silt_square(row[M * M * k + M * d + D]) / own[(M + 1) * d]);
+    }
 }
 
-silt_status silt_stiff_factor(silt_stiff **stiff, silt_fluid *f, const silt_step *s, bool pressure,
-                              silt_error *err) {
+silt_status silt_stiff_factor(silt_stiff **stiff, silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
     const silt_mesh *mesh = s->mesh;
     if (!*stiff) {
         *stiff = silt_alloc(1, sizeof **stiff);
-        (*stiff)->revision = -1;
+        silt_stiff_forget(*stiff);
     }
     silt_stiff *q = *stiff;
     silt_blocks *b = pressure ? &q->saddle : &q->velocity;
     b->ready = false;
-    q->n = mesh->n_node;
-    SILT_RESERVE(q->entry, q->entry_capacity, 9 * mesh->neighbour_start[q->n] + 1);
-    SILT_RESERVE(q->right, q->right_capacity, 3 * q->n + 1);
-    if (q->revision != mesh->revision || !q->velocity.factor.inside) {
-        int *order = node_order(mesh);
-        pattern(&q->velocity, mesh, 2, order);
-        pattern(&q->saddle, mesh, 3, order);
-        free(order);
-        q->revision = mesh->revision;
-    }
-    assemble(q, f, mesh);
-    hold(q, f, mesh, silt_closed_pieces(f, mesh));
-    fill(q, b, mesh);
-    bool done;
-    SILT_CLOCKED(factor, done = silt_factor_compute(&b->factor));
-    if (!done) {
-        q->revision = -1;
-        return silt_fail(err, SILT_FAILED, "the %s matrix of the stiff water could not be factored",
-                         pressure ? "saddle-point" : "momentum");
-    }
-    b->ready = true;
-    return SILT_OK;
+    SILT_RESERVE(q->right, q->right_capacity, 3 * mesh->n_node + 1);
+    if (pressure)
+        rows_assemble(3, q, b, f, mesh, silt_closed_pieces(f, mesh));
+    else
+        rows_assemble(2, q, b, f, mesh, NULL);
+    b->matrix = (silt_front_matrix){.n = mesh->n_node, .neighbour_start = mesh->neighbour_start, .neighbour = mesh->neighbour, .pair = b->pair,
+                                    .unknowns = pressure ? 3 : 2, .whole = b->whole, .threads = silt_threads(mesh->n_node)};
+    if (b->revision != mesh->revision)
+        SILT_CLOCKED(analyse, silt_front_order(&b->front, &b->matrix, s->nodes->x));
+    b->revision = mesh->revision;
+    int bad;
+    SILT_CLOCKED(factor, bad = silt_front_factor(b->front, &b->matrix));
+    b->ready = bad < 0;
+    if (b->ready)
+        return SILT_OK;
+    b->revision = -1;
+    return silt_fail(err, SILT_FAILED, "the %s matrix of the stiff water could not be factored near (%g, %g)", pressure ? "saddle-point" : "momentum",
+                     s->nodes->x[2 * bad], s->nodes->x[2 * bad + 1]);
 }
 
-static silt_status solve(silt_blocks *b, double *right, silt_error *err) {
-    if (!silt_factor_solve(&b->factor, right, right))
-        return silt_fail(err, SILT_FAILED, "the stiff water's system could not be solved (%d unknowns)", b->factor.n);
-    return SILT_OK;
-}
-
-silt_status silt_stiff_momentum(silt_stiff *q, const silt_fluid *f, const double *right, double *out, silt_error *err) {
-    memcpy(out, right, (size_t)(2 * q->n) * sizeof *out);
-    SILT_TRY(solve(&q->velocity, out, err));
-    for (int i = 0; i < q->n; i++)
+void silt_stiff_momentum(silt_stiff *q, const silt_fluid *f, const double *right, double *out) {
+    silt_front_solve(q->velocity.front, right, out);
+    for (int i = 0; i < f->n_node; i++)
         silt_hold_project(f, i, out + 2 * i);
-    return SILT_OK;
 }
 
-silt_status silt_stiff_correct(silt_stiff *q, const silt_fluid *f, const double *right, double *increment, double *v,
-                               silt_error *err) {
-    for (int i = 0; i < q->n; i++) {
+void silt_stiff_correct(silt_stiff *q, const silt_fluid *f, const double *right, double *increment, double *v) {
+    for (int i = 0; i < f->n_node; i++) {
         q->right[3 * i] = q->right[3 * i + 1] = 0;
         q->right[3 * i + 2] = -right[i];
     }
-    SILT_TRY(solve(&q->saddle, q->right, err));
-    for (int i = 0; i < q->n; i++) {
-        double dv[3] = {q->right[3 * i], q->right[3 * i + 1], 0};
+    silt_front_solve(q->saddle.front, q->right, q->right);
+    for (int i = 0; i < f->n_node; i++) {
+        double *dv = q->right + 3 * i;
+        increment[i] = dv[2];
+        dv[2] = 0;
         silt_hold_project(f, i, dv);
         v[2 * i] += dv[0];
         v[2 * i + 1] += dv[1];
-        increment[i] = q->right[3 * i + 2];
     }
-    return SILT_OK;
 }

@@ -90,7 +90,7 @@ static void info_scene(const silt_scene *scene, FILE *to) {
                 bed->density, bed->porosity, bed->work, bed->size, bed->n_region, area, area / silt_square(bed->size));
     }
     if (scene->grains.on)
-        fprintf(to, "  grains     %d at the start, parcels of %g m\n", scene->grains.n_grain, scene->grains.parcel);
+        fprintf(to, "  grains     %d at the start, parcels of %g m\n", silt_scene_grains(scene), scene->grains.parcel);
     for (int i = 0; i < scene->n_body; i++)
         fprintf(to, "  body       %s, %g kg/m3, %g m wide at (%g, %g)\n", scene->body[i].name, scene->body[i].density,
                 scene->body[i].scale, scene->body[i].at[0], scene->body[i].at[1]);

@@ -1,15 +1,10 @@
 // the state at t = 0: box of the scene, bed, bodies, the cloud of nodes and the first mesh
 #include "run.h"
 
-static bool run_solid(const void *context, const double x[2], double margin) {
+static bool run_solid(const void *context, const double *x, double margin) {
     const silt_barrier *barrier = context;
-    if (barrier->bed) {
-        if (silt_bed_contains(barrier->bed, x))
-            return true;
-        for (int k = 0; k < barrier->bed->n_node; k++)
-            if (barrier->bed->exposed[k] && hypot(barrier->bed->x[k][0] - x[0], barrier->bed->x[k][1] - x[1]) < margin)
-                return true;
-    }
+    if (barrier->bed && (silt_bed_contains(barrier->bed, x) || silt_bed_near(barrier->bed, x, margin)))
+        return true;
     const silt_barrier bodies = {.bodies = barrier->bodies};
     if (silt_barrier_contains(&bodies, x))
         return true;
@@ -31,12 +26,33 @@ void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def) {
     memcpy(def->hi, run->box_hi, sizeof def->hi);
 }
 
-// everything that walls, regions and bodies span, and room for splashes
+// everything that walls wherever they go, regions and bodies span, and room for splashes
 static void box_span(double lo[3], double hi[3], const double *x, int dim, double reach) {
     for (int d = 0; d < dim; d++) {
         lo[d] = silt_min(lo[d], x[d] - reach);
         hi[d] = silt_max(hi[d], x[d] + reach);
     }
+}
+
+// Where walls come in the course of their motion, from row to row, with places between for those that turn: the discrete elements
+// lose what leaves the box.
+static void box_motion(silt_run *run, double lo[3], double hi[3]) {
+    enum { BETWEEN = 16 };
+    const silt_scene *scene = run->scene;
+    for (int w = 0; w < scene->n_wall && scene->dimension != 3; w++) {
+        const silt_series *motion = &scene->wall[w].motion;
+        for (int r = 0; r < BETWEEN * motion->n_row; r++) {
+            const double *row = motion->value + (size_t)(r / BETWEEN) * (size_t)motion->n_column;
+            const double next = r / BETWEEN + 1 < motion->n_row ? row[motion->n_column] : row[0];
+            const double time = row[0] + (double)(r % BETWEEN) / BETWEEN * (next - row[0]);
+            silt_walls_move(&run->walls, scene, silt_min(time, scene->time.end), 0);
+            for (int s = 0; s < run->walls.count; s++) {
+                box_span(lo, hi, run->walls.from[s], 2, 0);
+                box_span(lo, hi, run->walls.to[s], 2, 0);
+            }
+        }
+    }
+    silt_walls_move(&run->walls, scene, 0, 0);
 }
 
 void silt_run_box(silt_run *run) {
@@ -60,12 +76,14 @@ void silt_run_box(silt_run *run) {
             box_span(lo, hi, a, D, 0);
             box_span(lo, hi, b, D, 0);
         }
+    if (silt_scene_has_dem(scene))
+        box_motion(run, lo, hi);
     for (int i = 0; i < run->nodes.count; i++)
         box_span(lo, hi, run->nodes.x + D * i, D, 0);
     for (int b = 0; b < scene->n_body; b++)
         box_span(lo, hi, scene->body[b].at, D, silt_max(scene->body[b].scale, scene->body[b].height));
-    for (int k = 0; k < scene->grains.n_grain; k++)
-        box_span(lo, hi, scene->grains.grain[k].at, D, scene->grains.grain[k].diameter);
+    for (int k = 0; k < silt_scene_grains(scene); k++)
+        box_span(lo, hi, silt_scene_grain(scene, k)->at, D, silt_scene_grain(scene, k)->diameter);
     // nothing holds water that has no walls: it may go far
     double margin = 0;
     for (int d = 0; d < D; d++)
@@ -94,7 +112,7 @@ void silt_run_locate(silt_run *run) {
 silt_status silt_run_first(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     if (scene->bed.on)
-        SILT_TRY(silt_bed_create(&run->bed, scene, err));
+        SILT_TRY(silt_bed_create(&run->bed, scene, &run->walls, err));
     run->bed_revision = run->bed.revision;
     if (silt_scene_has_dem(scene)) {
         silt_coupling_def def;
@@ -123,6 +141,8 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
         }
         free(point);
     }
+    if (silt_seep_on(scene))
+        silt_seep_fit(&run->seep, &run->bed, &run->nodes);
     for (int k = 0; k < run->bed.n_node; k++)
         if (run->bed.exposed[k])
             run->bed.fluid_node[k] = silt_nodes_add(&run->nodes, NODE_BED, k, run->bed.x[k]);

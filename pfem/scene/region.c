@@ -159,6 +159,38 @@ bool silt_region_contains(const silt_region *region, const double *x) {
     return false;
 }
 
+double silt_segment_distance(const double *a, const double *b, const double *x) {
+    const double u[2] = {b[0] - a[0], b[1] - a[1]}, w[2] = {x[0] - a[0], x[1] - a[1]};
+    const double length = silt_dot(2, u, u), share = length > 0 ? silt_clamp(silt_dot(2, u, w) / length, 0, 1) : 0;
+    return hypot(w[0] - share * u[0], w[1] - share * u[1]);
+}
+
+double silt_region_depth(const silt_region *region, const double *x) {
+    const bool space = silt_region_space(region);
+    const int dim = space ? 3 : 2;
+    double depth = HUGE_VAL;
+    switch (region->kind) {
+    case REGION_BOX:
+        for (int k = 0; k < dim; k++)
+            depth = silt_min(depth, silt_min(x[k] - region->lo[k], region->hi[k] - x[k]));
+        return depth;
+    case REGION_POLYGON: {
+        const double flat[2] = {x[0], space ? x[2] : x[1]};
+        for (int i = 0, k = region->n_point - 1; i < region->n_point; k = i++)
+            depth = silt_min(depth, silt_segment_distance(region->point + 3 * k, region->point + 3 * i, flat));
+        if (!silt_polygon_contains(region->n_point, region->point, flat))
+            depth = -depth;
+        return space ? silt_min(depth, silt_min(x[1] - region->lo[1], region->hi[1] - x[1])) : depth;
+    }
+    case REGION_CIRCLE:
+    case REGION_SPHERE:
+        for (int k = 0; k < dim; k++)
+            depth = k ? hypot(depth, x[k] - region->centre[k]) : fabs(x[k] - region->centre[k]);
+        return region->radius - depth;
+    }
+    return -HUGE_VAL;
+}
+
 double silt_region_area(const silt_region *region) {
     const bool space = silt_region_space(region);
     switch (region->kind) {

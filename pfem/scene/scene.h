@@ -170,46 +170,99 @@ typedef struct silt_fluid_def {
     silt_formula velocity; // initial
 } silt_fluid_def;
 
-typedef enum { BED_FRICTIONAL_WORK = 0, BED_DISSIPATION } silt_bed_law;
+typedef enum { BED_FRICTIONAL_WORK = 1, BED_DISSIPATION, BED_POWER, BED_EXCESS_SHEAR, BED_SHIELDS } silt_bed_law;
+typedef enum { SHEAR_DEFAULT = 0, SHEAR_PAPER, SHEAR_GRADIENT, SHEAR_LOG_LAW } silt_bed_shear;
+typedef enum { SEEPAGE_NONE = 0, SEEPAGE_DARCY, SEEPAGE_KOZENY_CARMAN } silt_seepage;
 typedef struct silt_bed_def {
     bool on;
     double density;   // kg/m3 of the grains' solid, required
     double porosity;  // required
-    double work;      // J/m3, W_c, required; .inf: never erodes
-    silt_bed_law law; // law: frictional-work | dissipation
-    double distance;  // m, h_k, where the law frictional-work samples the velocity; default fluid.size
+    silt_bed_law law; // law: frictional-work | dissipation | power | excess-shear | shields
+    double work;      // J/m3, W_c of the first three laws, required; .inf: never erodes
+    double erodibility; // m3/(N s), k_d of excess-shear, required
+    double critical;  // critical Shields number of the law shields; 0: Soulsby and Whitehouse
+    silt_bed_shear shear; // how the stress on the bed is found; after reading never default
+    double distance;  // m, h_k, where shear: paper samples the velocity; default fluid.size
+    double roughness; // m, k_s of shear: log-law and of the wall law on the bed; 0: 2.5 grains.diameter
     double size;      // m, spacing of the bed's nodes; default fluid.size
     double layer;     // m, layer thickness h_0 that one W_c removes; 0: the patch height
-    double threshold; // Pa, shear stress below which no work is done; default 0
+    double threshold; // Pa, tau_c, shear stress below which nothing wears; default 0; of shields: from critical
+    double repose;    // degrees, angle of repose; 0: a bed that stands at any slope
+    bool slope;       // default true: with repose, the threshold hangs on the slope
+    bool cover;       // default true: what resting parcels cover does not wear
     double saturation; // share of the pores that holds water, default 1
+    silt_seepage seepage; // seepage: none | darcy | kozeny-carman
+    double permeability;  // m2, with seepage: darcy
+    bool fluidise;     // seepage that outweighs the grains lifts them off the surface, default true
     bool deposition;   // default true
     silt_condition condition; // of water on the bed, default no-slip
     int n_region;
     silt_region *region; // owned
 } silt_bed_def;
 
-typedef enum { DRAG_NONE = 0, DRAG_SCHILLER_NAUMANN, DRAG_DI_FELICE } silt_drag_law;
-/** grains present from the start: one row each, or read from a region packing later */
+/** true where water can wear the bed */
+static inline bool silt_bed_erodes(const silt_bed_def *bed) {
+    return bed->on && (bed->law > BED_POWER || isfinite(bed->work));
+}
+
+typedef enum {
+    DRAG_NONE = 0,
+    DRAG_SCHILLER_NAUMANN,
+    DRAG_DI_FELICE,
+    DRAG_STOKES,
+    DRAG_ABRAHAM,
+    DRAG_ERGUN,
+    DRAG_WEN_YU,
+    DRAG_GIDASPOW,
+    DRAG_KOCH_HILL,
+    DRAG_BEETSTRA,
+} silt_drag_law;
+typedef enum { LIFT_NONE = 0, LIFT_SAFFMAN } silt_lift_law;
+/** a grain that is there from the start */
 typedef struct silt_grain_def {
     double at[3], velocity[3];
     double diameter; // m
     double density;  // kg/m3
+    bool fixed;      // held where it is, default false
 } silt_grain_def;
+typedef enum { ARRANGE_RANDOM = 0, ARRANGE_LATTICE } silt_arrangement;
+/** a region full of grains at the start (fill.c) */
+typedef struct silt_fill_def {
+    silt_region region;
+    double diameter;    // m; 0: what the sieve says
+    silt_series sieve;  // diameter in m, share of the mass that passes; n_row 0: none
+    double density;     // kg/m3
+    double velocity[3];
+    double porosity;    // share of the region's area (3-D: volume) between the grains; 0: not given
+    int count;          // grains; 0: not given
+    silt_arrangement arrangement;
+    int seed;
+    bool fixed; // its grains are held where they are, default false
+} silt_fill_def;
 typedef struct silt_grains_def {
     bool on;              // true when the block is there; bodies alone need contact properties too: see contact
-    silt_drag_law drag;   // drag: none | schiller-naumann | di-felice
+    silt_drag_law drag;   // drag: none | stokes | schiller-naumann | ..., docs/grains.md
     double diameter;      // m, d50 of the bed's grains: default parcel
     double parcel;        // m, diameter of the discrete elements that released bed becomes; required with a bed
     double width;         // m, accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel, or 5 d without bed
     double kernel;        // m, width of the porosity kernel; 0: max(3 d, 2 h)
+    double added_mass;    // 0, coefficient, of the displaced water's mass; spheres: 0.5
+    silt_lift_law lift;   // lift: none | saffman
+    bool viscous_force;   // V div tau, default false
+    bool rotational_drag; // torque on the spin, default false
     int n_grain;
     silt_grain_def *grain; // owned; key `list`
+    int n_fill;
+    silt_fill_def *fill;   // owned; key `regions`
+    int n_filled, filled_capacity;
+    silt_grain_def *filled; // owned, made while reading: the regions' grains, region by region
 } silt_grains_def;
 
 /** contact properties of grains, bodies and walls; block `contact`, required with grains, bed or bodies */
 typedef struct silt_contact_def {
     bool on;
-    double youngs_modulus;   // Pa, 5e6 to 1e9
+    double youngs_modulus;   // Pa, 5e6 to 1e12
+    double wall_modulus;     // Pa, Young's modulus of the walls; default youngs_modulus
     double poissons_ratio;
     double restitution;      // 0.05 to 1
     double friction;
@@ -252,6 +305,14 @@ typedef enum {
     GAUGE_FORCE,      // force_on: I: force of the water on wall I of the scene: columns NAME_x, NAME_y, NAME_z
     GAUGE_ANGULAR,    // angular_momentum_about: [x, y]; in 3-D columns NAME_x, NAME_y, NAME_z
     GAUGE_CENTROID,   // centroid_of: water: columns NAME_x, NAME_y, NAME_z
+    GAUGE_GRAIN_FRONT,  // grains_front: x | -x: the foremost x of the grains that hang together
+    GAUGE_GRAIN_HEIGHT, // grains_height_at: X (3-D: [x, y]): their top above that place
+    GAUGE_GRAIN_SLOPE,  // grains_slope: [x0, x1]: degrees by which it falls to the right, from x0 = from[0] to x1 = from[1]
+    GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
+    GAUGE_GRAIN_PLACE,    // grain_place: K: of grain K (silt_gauge_def.index): columns NAME_x, NAME_y, NAME_z
+    GAUGE_GRAIN_VELOCITY, // grain_velocity: K
+    GAUGE_GRAIN_SPIN,     // grain_spin: K
+    GAUGE_GRAIN_FORCE,    // grain_force: K: of its contacts
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
 } silt_gauge_kind;
 typedef struct silt_gauge_def {
@@ -354,6 +415,17 @@ int silt_series_column(const silt_series *series, const char *name); /**< column
 /** What silt_series_at needs: two columns or more, finite numbers, column 0 strictly rising. The error names file and line. */
 silt_status silt_series_rising(const silt_series *series, silt_error *err);
 
+/** m, k_s of the bed */
+static inline double silt_bed_roughness(const silt_scene *s) {
+    return s->bed.roughness > 0 ? s->bed.roughness : 2.5 * s->grains.diameter;
+}
+
+/** all grains that are there at the start: the list's, then the regions' */
+static inline int silt_scene_grains(const silt_scene *s) { return s->grains.n_grain + s->grains.n_filled; }
+static inline const silt_grain_def *silt_scene_grain(const silt_scene *s, int i) {
+    return i < s->grains.n_grain ? &s->grains.grain[i] : &s->grains.filled[i - s->grains.n_grain];
+}
+
 /** what a scene needs */
 static inline bool silt_scene_has_dem(const silt_scene *s) { return s->grains.on || s->n_body > 0; }
 
@@ -369,6 +441,8 @@ static inline int silt_scene_up(const silt_scene *s) { return s->dimension == 3 
 bool silt_region_space(const silt_region *region);
 /** @param x  2 numbers, 3 for a part of space */
 bool silt_region_contains(const silt_region *region, const double *x);
+/** how deep x lies in it: the distance to its rim; outside negative, the rim as far at least */
+double silt_region_depth(const silt_region *region, const double *x);
 double silt_region_area(const silt_region *region); /**< m2; m3 of a part of space */
 /** the box around it: 2 numbers each, 3 for a part of space */
 void silt_region_bounds(const silt_region *region, double *lo, double *hi);
@@ -378,6 +452,7 @@ double silt_polygon_area(int n, const double *point); /**< positive when counter
 void silt_polygon_centroid(int n, const double *point, double centre[3]);
 bool silt_polygon_contains(int n, const double *point, const double *x);
 bool silt_segments_meet(const double *a, const double *b, const double *c, const double *d); /**< touching counts */
+double silt_segment_distance(const double *a, const double *b, const double *x); /**< of x to the segment a b */
 bool silt_chain_straight(int n, const double *point); /**< all points on one line */
 /** true when two edges meet elsewhere than at a shared corner; crossing: their indices, the smaller first */
 bool silt_chain_crosses(int n, const double *point, bool closed, int crossing[2]);

@@ -15,18 +15,19 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     bool has_bodies = scene->n_body > 0;
     if (scene->dimension == 3) {
         // the others were refused already
-        bed = grains = bodies = NULL;
+        bodies = NULL;
         if (!fluid)
             silt_complain(
                 reader, root,
-                "key 'fluid': found no water, allowed a scene with fluid: the rest is two-dimensional so far");
+                "key 'fluid': found no water, allowed a scene with fluid: in three dimensions grains come with water so far");
     } else if (!fluid && !grains && !has_bodies && !bodies)
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
                       "one of fluid, grains, bodies");
-    if (bed && !grains)
+    const bool fixed = !silt_bed_erodes(&scene->bed) && !grains; // a bed that gives nothing needs no grains
+    if (bed && !grains && !fixed)
         silt_complain_key(reader, bed,
-                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}: "
+                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}, or one that gives nothing (work: .inf): "
                           "eroded bed becomes grains");
     if (bed && scene->grains.on && !silt_tree_item(grains, "parcel"))
         silt_complain_key(reader, grains,
@@ -36,7 +37,7 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         silt_complain(reader, silt_tree_item(grains, "parcel"),
                       "key 'grains.parcel': found 0, allowed a number in m, > 0: "
                       "the bed's parcels need a diameter");
-    const silt_tree *first = bed ? bed : grains ? grains : has_bodies ? bodies : NULL;
+    const silt_tree *first = bed && !fixed ? bed : grains ? grains : has_bodies ? bodies : NULL;
     if (first && !silt_tree_item(root, "contact"))
         silt_complain_key(reader, first,
                           "key '%s': found it without contact properties, allowed with a block contact "
@@ -49,6 +50,29 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     const silt_tree *regions = silt_tree_item(bed, "regions");
     if (regions && regions->kind == TREE_LIST && regions->n_item == 0)
         silt_complain(reader, regions, "key 'bed.regions': found an empty list, allowed at least one region");
+}
+
+// seepage has its law's number and water to flow in
+static void check_seepage(silt_reader *reader, const silt_scene *scene) {
+    const silt_bed_def *bed = &scene->bed;
+    const silt_tree *node = silt_tree_item(reader->root, "bed");
+    if (!bed->on)
+        return;
+    if (bed->seepage == SEEPAGE_DARCY && bed->permeability == 0)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.permeability': found none beside seepage: darcy, allowed a number in m2, > 0");
+    if (bed->seepage != SEEPAGE_DARCY && bed->permeability > 0)
+        silt_complain(reader, silt_tree_item(node, "permeability"),
+                      "key 'bed.permeability': found %.10g, allowed with seepage: darcy alone", bed->permeability);
+    if (bed->seepage != SEEPAGE_NONE && !scene->fluid.on)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.seepage': found it without water, allowed in a scene with fluid");
+    if (bed->seepage != SEEPAGE_NONE && scene->fluid.on && scene->fluid.viscosity == 0)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.seepage': found it beside fluid.viscosity: 0, allowed with a viscosity > 0");
+    if (bed->seepage != SEEPAGE_NONE && scene->fluid.on && scene->fluid.pressure == PRESSURE_LAPLACIAN)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.seepage': found it beside fluid.pressure: laplacian, allowed consistent there");
 }
 
 // a number of frames that fits their names
@@ -206,6 +230,13 @@ static void check_inside(silt_reader *reader, const silt_scene *scene) {
         if (!check_box_holds(&box, lo, hi, 0))
             check_outside(reader, silt_tree_find(reader->root, "bed.regions.%d", i), &box, "bed.regions.%d", i);
     }
+    for (int i = 0; box.known && i < scene->grains.n_fill; i++) {
+        if (!check_region_whole(scene, &scene->grains.fill[i].region))
+            continue;
+        silt_region_bounds(&scene->grains.fill[i].region, lo, hi);
+        if (!check_box_holds(&box, lo, hi, 0))
+            check_outside(reader, silt_tree_find(reader->root, "grains.regions.%d", i), &box, "grains.regions.%d", i);
+    }
     for (int i = 0; box.known && i < scene->grains.n_grain; i++) {
         const double *at = scene->grains.grain[i].at;
         if (!check_box_holds(&box, at, at, 0))
@@ -282,13 +313,6 @@ static check_shape check_shape_make(const silt_body_def *body) {
     return shape;
 }
 
-// from x to the segment a b
-static double check_distance(const double *a, const double *b, const double *x) {
-    double ux = b[0] - a[0], uy = b[1] - a[1], length = ux * ux + uy * uy;
-    double share = length > 0 ? silt_clamp(((x[0] - a[0]) * ux + (x[1] - a[1]) * uy) / length, 0, 1) : 0;
-    return hypot(a[0] + share * ux - x[0], a[1] + share * uy - x[1]);
-}
-
 // circles first, they are cheap
 static bool check_shapes_overlap(const check_shape *a, const check_shape *b) {
     if (hypot(a->centre[0] - b->centre[0], a->centre[1] - b->centre[1]) >= a->radius + b->radius)
@@ -304,7 +328,7 @@ static bool check_shapes_overlap(const check_shape *a, const check_shape *b) {
     if (b->n_point == 0) {
         bool near = silt_polygon_contains(a->n_point, a->point, b->centre);
         for (int i = 0; i < a->n_point && !near; i++)
-            near = check_distance(a->point + 3 * i, a->point + 3 * ((i + 1) % a->n_point), b->centre) < b->radius;
+            near = silt_segment_distance(a->point + 3 * i, a->point + 3 * ((i + 1) % a->n_point), b->centre) < b->radius;
         return near;
     }
     for (int i = 0; i < a->n_point; i++)
@@ -397,6 +421,58 @@ static void check_bodies(silt_reader *reader, const silt_scene *scene) {
     free(span);
 }
 
+// grains that fill regions -----------------------------------------------------------------------------
+/** what they keep clear of */
+typedef struct check_clear {
+    const silt_scene *scene;
+    check_shape *body; // owned, one per body
+} check_clear;
+
+// from the wall's elements, and not inside of an obstacle; where surfaces from files lie is not known here
+static bool clear_of_wall(const silt_scene *scene, const silt_wall *wall, const double *x, double radius) {
+    if (wall->form == WALL_BOX && scene->dimension == 3) {
+        for (int k = 0; k < 3; k++)
+            if (x[k] - wall->lo[k] < radius || wall->hi[k] - x[k] < radius)
+                return false;
+        return true;
+    }
+    const int n = wall->n_point;
+    for (int i = 0; i + 1 < n + wall->closed; i++)
+        if (silt_segment_distance(wall->point + 3 * i, wall->point + 3 * ((i + 1) % n), x) < radius)
+            return false;
+    return !wall->closed || silt_polygon_area(n, wall->point) > 0 || !silt_polygon_contains(n, wall->point, x);
+}
+
+static bool check_clear_at(const void *context, const double *x, double radius) {
+    const check_clear *clear = context;
+    const silt_scene *scene = clear->scene;
+    const double reach = radius * (1 - 1e-9); // touching is allowed
+    for (int i = 0; i < scene->n_wall; i++)
+        if (!clear_of_wall(scene, &scene->wall[i], x, reach))
+            return false;
+    for (int i = 0; i < scene->bed.n_region; i++)
+        if (silt_region_depth(&scene->bed.region[i], x) > -reach)
+            return false;
+    const check_shape grain = {.centre = {x[0], x[1]}, .radius = reach};
+    for (int i = 0; i < scene->n_body; i++)
+        if (check_shapes_overlap(&clear->body[i], &grain))
+            return false;
+    return true;
+}
+
+// what all keys are sound for
+static void check_fill(silt_reader *reader, silt_scene *scene) {
+    if (reader->n_complaint > 0 || scene->grains.n_fill == 0)
+        return;
+    check_clear clear = {scene, silt_alloc((size_t)scene->n_body + 1, sizeof *clear.body)};
+    for (int i = 0; i < scene->n_body; i++)
+        clear.body[i] = check_shape_make(&scene->body[i]);
+    silt_scene_fill(reader, scene, check_clear_at, &clear);
+    for (int i = 0; i < scene->n_body; i++)
+        free(clear.body[i].point);
+    free(clear.body);
+}
+
 // columns of history.csv -------------------------------------------------------------------------------
 typedef struct check_column {
     char name[64];
@@ -404,61 +480,19 @@ typedef struct check_column {
 } check_column;
 
 // the same as in history.c; a test holds them together
-static const char *const check_fixed[] = {"step",
-                                          "time",
-                                          "dt",
-                                          "n_node",
-                                          "n_cell",
-                                          "fluid_volume",
-                                          "flying_volume",
-                                          "mesh_volume",
-                                          "fluid_mass",
-                                          "volume_error",
-                                          "kinetic_energy",
-                                          "potential_energy",
-                                          "momentum_x",
-                                          "momentum_y",
-                                          "momentum_z",
-                                          "momentum_error",
-                                          "external_work",
-                                          "dissipation",
-                                          "max_speed",
-                                          "volume_solved",
-                                          "volume_moved",
-                                          "volume_reconnected",
-                                          "volume_refined",
-                                          "volume_given",
-                                          "volume_owed",
-                                          "y_plus",
-                                          "angular_momentum_x",
-                                          "angular_momentum_y",
-                                          "angular_momentum_z",
-                                          "bed_mass",
-                                          "released_mass",
-                                          "deposited_mass",
-                                          "pore_water_mass",
-                                          "grain_count",
-                                          "grain_mass",
-                                          "grain_velocity_x",
-                                          "grain_velocity_y",
-                                          "grain_velocity_z",
-                                          "grain_water_x",
-                                          "grain_water_y",
-                                          "grain_water_z",
-                                          "grain_contact_x",
-                                          "grain_contact_y",
-                                          "grain_contact_z",
-                                          "sediment_error",
-                                          "left_mass",
-                                          "inflow_mass",
-                                          "outflow_mass",
-                                          "wall_mesh",
-                                          "wall_assemble",
-                                          "wall_solve",
-                                          "wall_bed",
-                                          "wall_dem",
-                                          "wall_move",
-                                          "wall_output"};
+// clang-format off
+static const char *const check_fixed[] = {
+    "step", "time", "dt", "n_node", "n_cell", "fluid_volume", "flying_volume", "mesh_volume", "fluid_mass",
+    "volume_error", "kinetic_energy", "potential_energy", "momentum_x", "momentum_y", "momentum_z", "momentum_error",
+    "external_work", "dissipation", "max_speed", "volume_solved", "volume_moved", "volume_reconnected",
+    "volume_refined", "volume_given", "volume_owed", "y_plus", "angular_momentum_x", "angular_momentum_y",
+    "angular_momentum_z", "bed_mass", "released_mass", "deposited_mass", "pore_water_mass", "bed_shear", "bed_work",
+    "bed_y_plus", "seepage", "seepage_volume", "seepage_lost", "grain_count", "grain_mass", "grain_velocity_x",
+    "grain_velocity_y", "grain_velocity_z", "grain_kinetic_energy", "grain_potential_energy", "grain_water_x",
+    "grain_water_y", "grain_water_z", "grain_contact_x", "grain_contact_y", "grain_contact_z", "sediment_error",
+    "left_mass", "inflow_mass", "outflow_mass", "wall_mesh", "wall_assemble", "wall_solve", "wall_bed", "wall_dem",
+    "wall_move", "wall_output"};
+// clang-format on
 static const char *const check_of_body[] = {"x",  "y",  "z",  "vx", "vy", "vz", "qw", "qx", "qy", "qz", "wx",
                                             "wy", "wz", "fx", "fy", "fz", "tx", "ty", "tz", "cx", "cy", "cz"};
 enum {
@@ -687,6 +721,10 @@ static void check_gauges(silt_reader *reader, const silt_scene *scene) {
             silt_complain(reader, silt_tree_item(node, "force_on"),
                           "key 'gauges.%d.force_on': found %d, allowed the number of a wall, the first is 0; there are %d", i,
                           gauge->index, scene->n_wall);
+        const bool grain = gauge->kind >= GAUGE_GRAIN_PLACE && gauge->kind <= GAUGE_GRAIN_FORCE;
+        const bool grains = grain || (gauge->kind >= GAUGE_GRAIN_FRONT && gauge->kind <= GAUGE_GRAIN_SLOPE);
+        if (grains && !scene->grains.on)
+            silt_complain(reader, node, "key 'gauges.%d': found a gauge of grains, allowed in a scene with a block grains", i);
         if (gauge->kind == GAUGE_EXTENT && gauge->from[0] == 2 && scene->dimension != 3)
             silt_complain(reader, silt_tree_item(node, "extent"),
                           "key 'gauges.%d.extent': found z, allowed x or y in two dimensions", i);
@@ -696,6 +734,7 @@ static void check_gauges(silt_reader *reader, const silt_scene *scene) {
 void silt_scene_check(silt_reader *reader, silt_scene *scene) {
     check_blocks(reader, scene);
     check_time(reader, scene);
+    check_seepage(reader, scene);
     check_tension(reader, scene);
     check_walls(reader, scene);
     const check_box box = check_box_make(scene, true);
@@ -709,4 +748,5 @@ void silt_scene_check(silt_reader *reader, silt_scene *scene) {
     check_names(reader, scene, column, n);
     check_checks(reader, scene, column, n);
     free(column);
+    check_fill(reader, scene);
 }

@@ -41,6 +41,8 @@ uint64_t silt_scene_hash(const silt_scene *scene) {
         hash = hash_outline(hash, &scene->bed.region[i]);
     for (int i = 0; i < fluid->n_size; i++)
         hash = hash_outline(hash, &fluid->size_at[i].region);
+    for (int i = 0; i < scene->grains.n_fill; i++)
+        hash = hash_outline(hash_series(hash, &scene->grains.fill[i].sieve), &scene->grains.fill[i].region);
     hash = hash_series(hash, &fluid->velocity.series);
     hash = hash_series(hash, &fluid->force.series);
     return hash_file(hash, fluid->cloud);

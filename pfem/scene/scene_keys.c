@@ -33,9 +33,19 @@ static const silt_word rheology_words[] = {{"newtonian", RHEOLOGY_NEWTONIAN},
 static const silt_word near_words[] = {{"region", NEAR_REGION}, {"walls", NEAR_WALLS},     {"bed", NEAR_BED},
                                        {"bodies", NEAR_BODIES}, {"surface", NEAR_SURFACE}, {0}};
 static const silt_word axis_words[] = {{"none", 0}, {"x", 1}, {"y", 2}, {"z", 3}, {0}};
-static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, {"dissipation", BED_DISSIPATION}, {0}};
+static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, {"dissipation", BED_DISSIPATION},
+                                      {"power", BED_POWER}, {"excess-shear", BED_EXCESS_SHEAR},
+                                      {"shields", BED_SHIELDS}, {0}};
+static const silt_word shear_words[] = {{"default", SHEAR_DEFAULT}, {"paper", SHEAR_PAPER}, {"gradient", SHEAR_GRADIENT},
+                                        {"log-law", SHEAR_LOG_LAW}, {0}};
+static const silt_word seepage_words[] = {
+    {"none", SEEPAGE_NONE}, {"darcy", SEEPAGE_DARCY}, {"kozeny-carman", SEEPAGE_KOZENY_CARMAN}, {0}};
 static const silt_word drag_words[] = {
-    {"none", DRAG_NONE}, {"schiller-naumann", DRAG_SCHILLER_NAUMANN}, {"di-felice", DRAG_DI_FELICE}, {0}};
+    {"none", DRAG_NONE},       {"stokes", DRAG_STOKES},         {"schiller-naumann", DRAG_SCHILLER_NAUMANN}, {"abraham", DRAG_ABRAHAM},
+    {"di-felice", DRAG_DI_FELICE}, {"ergun", DRAG_ERGUN},       {"wen-yu", DRAG_WEN_YU},
+    {"gidaspow", DRAG_GIDASPOW}, {"koch-hill", DRAG_KOCH_HILL}, {"beetstra", DRAG_BEETSTRA}, {0}};
+static const silt_word arrange_words[] = {{"random", ARRANGE_RANDOM}, {"lattice", ARRANGE_LATTICE}, {0}};
+static const silt_word lift_words[] = {{"none", LIFT_NONE}, {"saffman", LIFT_SAFFMAN}, {0}};
 static const silt_word shape_words[] = {
     {"box", SHAPE_BOX}, {"disc", SHAPE_DISC}, {"polygon", SHAPE_POLYGON}, {"temple", SHAPE_TEMPLE}, {0}};
 static const silt_word motion_words[] = {{"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {0}};
@@ -346,20 +356,45 @@ TABLE(wall, "a wall", silt_wall, offsetof(silt_wall, form));
 static const silt_key bed_rows[] = {
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_bed_def, density), .doc = "of the grains' solid"},
     {"porosity", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_bed_def, porosity), .doc = "share of pores"},
+    {"law", KEY_WORD, .flags = KEY_SELECTOR, .fallback = "frictional-work", .words = law_words, AT(silt_bed_def, law),
+     .doc = "how fast the water wears the bed; see docs/bed.md"},
     {"work", KEY_NUMBER, .unit = "J/m3", .flags = KEY_OPEN_LOW | KEY_INFINITE, RANGE(0, HUGE_VAL),
-     AT(silt_bed_def, work), .doc = "frictional work that loosens the bed; .inf: never"},
-    {"law", KEY_WORD, .fallback = "frictional-work", .words = law_words, AT(silt_bed_def, law),
-     .doc = "how the water's work on the bed is found"},
+     AT(silt_bed_def, work), .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION) | ONLY(BED_POWER),
+     .doc = "W_c, frictional work that loosens the bed; .inf: never. A constant of law, mesh and water, not of the soil: at a rate of "
+            "E m/s under tau it is h_b tau^2/(viscosity E), h_b the patch height; power: (tau - threshold) u*/E"},
+    {"erodibility", KEY_NUMBER, .unit = "m3/(N s)", POSITIVE, AT(silt_bed_def, erodibility), .when = ONLY(BED_EXCESS_SHEAR),
+     .doc = "k_d of E = k_d (tau - threshold); Hanson and Simon: 2e-7 threshold^-0.5"},
+    {"critical_shields", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, critical), .when = ONLY(BED_SHIELDS),
+     .doc = "Shields number at which grains begin to move; 0: Soulsby and Whitehouse for grains.diameter"},
+    {"shear", KEY_WORD, .fallback = "default", .words = shear_words, AT(silt_bed_def, shear),
+     .doc = "stress on the bed: viscosity v/(2 distance), viscosity times the gradient at the bed, or the law of a rough wall; default: "
+            "paper for frictional-work, gradient for dissipation, log-law for the others"},
     {"distance", KEY_NUMBER, .unit = "m", .fallback = "=fluid.size", POSITIVE, AT(silt_bed_def, distance),
-     .doc = "where the law frictional-work samples the velocity, along the normal"},
+     .doc = "where shear: paper samples the velocity, along the normal"},
+    {"roughness", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, roughness),
+     .doc = "equivalent sand roughness of the bed, for log-law and for condition: wall-law; 0: 2.5 grains.diameter"},
     {"size", KEY_NUMBER, .unit = "m", .fallback = "=fluid.size", POSITIVE, AT(silt_bed_def, size),
      .doc = "distance between the bed's nodes"},
     {"layer", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, layer),
+     .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION),
      .doc = "thickness that one `work` removes; 0: the height of the patch"},
     {"threshold", KEY_NUMBER, .unit = "Pa", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, threshold),
-     .doc = "shear stress below which no work is done"},
+     .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION) | ONLY(BED_POWER) | ONLY(BED_EXCESS_SHEAR),
+     .doc = "shear stress below which nothing wears, on level ground"},
+    {"repose", KEY_NUMBER, .unit = "degrees", .fallback = "0", .low = 0, .high = 80, AT(silt_bed_def, repose),
+     .doc = "angle of repose: what stands steeper falls as grains; 0: it stands at any slope, but not upside down"},
+    {"slope", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, slope),
+     .doc = "with repose, the threshold falls downhill and rises uphill"},
+    {"cover", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, cover),
+     .doc = "the part of the bed that parcels lie on does not wear"},
     {"saturation", KEY_NUMBER, .fallback = "1", RANGE(0, 1), AT(silt_bed_def, saturation),
      .doc = "share of the pores that holds water"},
+    {"seepage", KEY_WORD, .fallback = "none", .words = seepage_words, AT(silt_bed_def, seepage),
+     .doc = "water in the bed's pores: none, by `permeability`, or by grains.diameter and the pores of each cell, d^2 n^3/(180 (1 - n)^2)"},
+    {"permeability", KEY_NUMBER, .unit = "m2", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, permeability),
+     .doc = "for seepage: darcy; the hydraulic conductivity K in m/s is this times density g/viscosity"},
+    {"fluidise", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, fluidise),
+     .doc = "seepage that outweighs the grains on the surface lifts them off"},
     {"deposition", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, deposition),
      .doc = "resting grains become bed again"},
     {"condition", KEY_WORD, .fallback = "no-slip", .words = condition_words, AT(silt_bed_def, condition),
@@ -367,15 +402,39 @@ static const silt_key bed_rows[] = {
     {"regions", KEY_LIST, .sub = &region_table, MANY(silt_bed_def, n_region, region),
      .doc = "where bed is at the start"},
     {0}};
-TABLE(bed, "the bed block", silt_bed_def, -1);
+TABLE(bed, "the bed block", silt_bed_def, offsetof(silt_bed_def, law));
 
 static const silt_key grain_rows[] = {
     {"at", KEY_POINT, .unit = "m", AT(silt_grain_def, at), .doc = "centre"},
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_grain_def, velocity), .doc = "at the start"},
     {"diameter", KEY_NUMBER, .unit = "m", POSITIVE, AT(silt_grain_def, diameter), .doc = "of this grain"},
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_grain_def, density), .doc = "of its solid"},
+    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_grain_def, fixed), .doc = "it is held where it is, at rest; others touch it"},
     {0}};
 TABLE(grain, "a grain", silt_grain_def, -1);
+
+static const silt_key fill_rows[] = {
+    REGION_ROWS(silt_fill_def, region.),
+    {"diameter", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_fill_def, diameter),
+     .doc = "of its grains; 0: those of the sieve"},
+    {"sieve", KEY_TABLE, .flags = KEY_OPTIONAL, AT(silt_fill_def, sieve),
+     .doc = "CSV file beside the scene with the columns diameter in m and passing, the share of the mass that is finer, from 0 to 1, "
+            "linear between rows"},
+    {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_fill_def, density), .doc = "of the grains' solid"},
+    {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_fill_def, velocity), .doc = "at the start"},
+    {"porosity", KEY_NUMBER, .fallback = "0", .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_fill_def, porosity),
+     .doc = "share of the region's area, in 3-D of its volume, that is left between the grains; 0: as `count` says"},
+    {"count", KEY_INTEGER, .fallback = "0", RANGE(0, SCENE_GRAINS), AT(silt_fill_def, count),
+     .doc = "how many grains; 0: as the porosity says, and without it as many as the arrangement holds, random up to a share of 0.45 "
+            "(3-D: 0.3)"},
+    {"arrangement", KEY_WORD, .fallback = "random", .words = arrange_words, AT(silt_fill_def, arrangement),
+     .doc = "random: one after the other anywhere, beyond a share of 0.45 (3-D: 0.3) shaken from a lattice; lattice: rows of triangles, "
+            "from below; denser packings come by letting grains settle"},
+    {"seed", KEY_INTEGER, .fallback = "1", RANGE(0, INT32_MAX), AT(silt_fill_def, seed),
+     .doc = "of the random places: the same places for the same seed"},
+    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_fill_def, fixed), .doc = "its grains are held where they are, at rest: a packed bed"},
+    {0}};
+TABLE(fill, "a region of grains", silt_fill_def, offsetof(silt_fill_def, region.kind));
 
 static const silt_key grains_rows[] = {
     {"drag", KEY_WORD, .fallback = "di-felice", .words = drag_words, AT(silt_grains_def, drag), .doc = "drag law"},
@@ -383,18 +442,29 @@ static const silt_key grains_rows[] = {
      .doc = "diameter of the elements that released bed becomes; needed with a bed"},
     {"diameter", KEY_NUMBER, .unit = "m", .fallback = "=grains.parcel", NOT_NEGATIVE, AT(silt_grains_def, diameter),
      .doc = "of the grains that a parcel stands for, for the drag"},
-    {"width", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, width),
-     .doc = "accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel, 5 d without a bed"},
+    {"width", KEY_NUMBER, .unit = "m", .fallback = "0", .flags = KEY_PLANE, NOT_NEGATIVE, AT(silt_grains_def, width),
+     .doc = "accounting width; 0: (2/3)(0.82) d/(1 - n) of the parcel; without a bed 0.91 d with regions (n = 0.4), else 5 d"},
     {"kernel", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, kernel),
      .doc = "width of the porosity kernel; 0: the larger of 3 d and 2 h"},
+    {"added_mass", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, added_mass),
+     .doc = "share of the displaced water that is accelerated along; spheres: 0.5"},
+    {"lift", KEY_WORD, .fallback = "none", .words = lift_words, AT(silt_grains_def, lift), .doc = "force across the water's shear"},
+    {"viscous_force", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, viscous_force),
+     .doc = "force of the water's viscous stress on the grain's volume"},
+    {"rotational_drag", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, rotational_drag),
+     .doc = "torque of the water on grains that spin otherwise than it does"},
     {"list", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &grain_table, MANY(silt_grains_def, n_grain, grain),
      .doc = "grains that are there from the start"},
+    {"regions", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &fill_table, MANY(silt_grains_def, n_fill, fill),
+     .doc = "what is full of grains at the start; they keep clear of walls, bed, bodies and other grains"},
     {0}};
 TABLE(grains, "the grains block", silt_grains_def, -1);
 
 static const silt_key contact_rows[] = {
-    {"youngs_modulus", KEY_NUMBER, .unit = "Pa", RANGE(5e6, 1e9), AT(silt_contact_def, youngs_modulus),
+    {"youngs_modulus", KEY_NUMBER, .unit = "Pa", RANGE(5e6, 1e12), AT(silt_contact_def, youngs_modulus),
      .doc = "of grains and bodies; soft is fast"},
+    {"wall_modulus", KEY_NUMBER, .unit = "Pa", .fallback = "=contact.youngs_modulus", RANGE(5e6, 1e16), AT(silt_contact_def, wall_modulus),
+     .doc = "Young's modulus of the walls; a thousand times that of the grains is rigid"},
     {"poissons_ratio", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 0.5), AT(silt_contact_def, poissons_ratio),
      .doc = "of grains and bodies"},
     {"restitution", KEY_NUMBER, RANGE(0.05, 1), AT(silt_contact_def, restitution), .doc = "coefficient of restitution"},
@@ -442,12 +512,26 @@ static const silt_key gauge_rows[] = {
      .doc = "velocity there, columns NAME_x, NAME_y, NAME_z"},
     {"discharge", KEY_SEGMENT, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_DISCHARGE,
      AT(silt_gauge_def, from), .doc = "flow through the segment from its left to its right, m2/s"},
-    {"bed_level_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_BED_LEVEL,
-     AT(silt_gauge_def, from), .doc = "height of the bed at this x"},
-    {"scour_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_SCOUR,
-     AT(silt_gauge_def, from), .doc = "how deep the bed lies under its level at the start, at this x"},
+    {"bed_level_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_BED_LEVEL,
+     AT(silt_gauge_def, from), .doc = "height of the bed at this x (3-D: [x, y])"},
+    {"scour_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_SCOUR,
+     AT(silt_gauge_def, from), .doc = "how deep the bed lies under its level at the start, at this x (3-D: [x, y])"},
     {"extent", KEY_SIGN, .flags = KEY_CHOICE, .words = extent_words, .select = GAUGE_EXTENT, AT(silt_gauge_def, from),
      .doc = "length of connected water along this axis, m"},
+    {"grains_front", KEY_SIGN, .flags = KEY_CHOICE, .words = front_words, .select = GAUGE_GRAIN_FRONT, AT(silt_gauge_def, from),
+     .doc = "foremost x to this side of the heap: the grains that hang together, the most mass of them"},
+    {"grains_height_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_GRAIN_HEIGHT, AT(silt_gauge_def, from),
+     .doc = "top of the heap at this x (3-D: [x, y])"},
+    {"grains_slope", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_GRAIN_SLOPE, AT(silt_gauge_def, from),
+     .doc = "angle in degrees by which the top of the heap falls to the right, by least squares between these two x"},
+    {"grain_place", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_PLACE, AT(silt_gauge_def, index),
+     .doc = "centre of this grain, those of the list from 1, then the regions'; columns NAME_x, NAME_y, NAME_z"},
+    {"grain_velocity", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_VELOCITY,
+     AT(silt_gauge_def, index), .doc = "of this grain, columns NAME_x, NAME_y, NAME_z"},
+    {"grain_spin", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_SPIN, AT(silt_gauge_def, index),
+     .doc = "angular velocity of this grain, rad/s, columns NAME_x, NAME_y, NAME_z"},
+    {"grain_force", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_FORCE, AT(silt_gauge_def, index),
+     .doc = "force of contacts on this grain, mean of the last step, N, columns NAME_x, NAME_y, NAME_z; per metre of width in 2-D"},
     {"force_on", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(0, INT32_MAX), .select = GAUGE_FORCE,
      AT(silt_gauge_def, index),
      .doc = "force of the water on this wall of the list, from 0; columns NAME_x, NAME_y, NAME_z, N"},
@@ -456,6 +540,8 @@ static const silt_key gauge_rows[] = {
      .doc = "of the water about this point, kg m2/s; in three dimensions columns NAME_x, NAME_y, NAME_z"},
     {"centroid_of", KEY_SIGN, .flags = KEY_CHOICE, .words = water_words, .select = GAUGE_CENTROID,
      AT(silt_gauge_def, from), .doc = "centre of mass of the water, columns NAME_x, NAME_y, NAME_z, m"},
+    {"grains_in", KEY_BOX, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_GRAINS, AT(silt_gauge_def, from),
+     .doc = "of the grains in this box: mean velocity by mass, columns NAME_x, NAME_y, NAME_z, m/s, and their mass, NAME_m, kg (2-D: per metre of width)"},
     {0}};
 TABLE(gauge, "a gauge", silt_gauge_def, offsetof(silt_gauge_def, kind));
 
@@ -532,11 +618,11 @@ static const silt_key scene_rows[] = {
      .present = offsetof(silt_scene, fluid.on), AT(silt_scene, fluid), .doc = "the water"},
     {"walls", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &wall_table, MANY(silt_scene, n_wall, wall),
      .doc = "what holds it"},
-    {"bed", KEY_BLOCK, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &bed_table, .presence = PRESENT_FLAG,
+    {"bed", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &bed_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, bed.on), AT(silt_scene, bed), .doc = "ground that the water can erode"},
-    {"grains", KEY_BLOCK, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &grains_table, .presence = PRESENT_FLAG,
+    {"grains", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &grains_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, grains.on), AT(silt_scene, grains), .doc = "loose grains; needed with a bed"},
-    {"contact", KEY_BLOCK, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &contact_table, .presence = PRESENT_FLAG,
+    {"contact", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &contact_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, contact.on), AT(silt_scene, contact),
      .doc = "how solids touch; needed with a bed, grains or bodies"},
     {"bodies", KEY_LIST, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &body_table, MANY(silt_scene, n_body, body),

@@ -119,7 +119,7 @@ typedef struct silt_tree {
     struct silt_tree **item; // owned array, items owned by the reader
 } silt_tree;
 
-enum { SCENE_COMPLAINTS = 50, SCENE_DEPTH = 64, SCENE_NODES = 1000000, SCENE_BYTES = 8 << 20, SCENE_CORNERS = 20000 };
+enum { SCENE_COMPLAINTS = 50, SCENE_DEPTH = 64, SCENE_NODES = 1000000, SCENE_BYTES = 8 << 20, SCENE_CORNERS = 20000, SCENE_GRAINS = 2000000 };
 
 typedef struct silt_source {
     char *name, *text; // owned
@@ -169,6 +169,10 @@ void silt_scene_settle(silt_reader *reader, silt_scene *scene);
 void silt_scene_check(silt_reader *reader, silt_scene *scene);
 /** Inlets and outlets (scene_openings.c). @param lo, hi  of the box that walls and water span, hi < lo: not known */
 void silt_scene_check_openings(silt_reader *reader, const silt_scene *scene, const double lo[3], const double hi[3]);
+/** true where a grain of that radius at x touches no wall, bed or body */
+typedef bool silt_fill_clear(const void *context, const double *x, double radius);
+/** Fills grains.regions into grains.filled; a complaint where more is asked for than fits (fill.c). */
+void silt_scene_fill(silt_reader *reader, silt_scene *scene, silt_fill_clear *clear, const void *context);
 /** the resolved scene as YAML; owned by the caller. names: files with their folder (true), or their last part only */
 char *silt_scene_text(const silt_scene *scene, bool folders);
 uint64_t silt_scene_hash(const silt_scene *scene); // scene_hash.c

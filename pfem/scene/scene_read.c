@@ -714,6 +714,7 @@ void silt_scene_free(silt_scene **scene) {
     silt_formula_clear(&(*scene)->fluid.velocity);
     silt_formula_clear(&(*scene)->fluid.force);
     read_free(&silt_scene_keys, *scene);
+    free((*scene)->grains.filled);
     free((*scene)->path);
     free((*scene)->folder);
     free((*scene)->resolved);

@@ -132,13 +132,17 @@ static void settle_outline(silt_reader *reader, const silt_scene *scene, silt_re
 }
 
 static void settle_regions(silt_reader *reader, silt_scene *scene) {
-    silt_region *const list[3] = {scene->fluid.region, scene->bed.region, NULL};
-    const int count[3] = {scene->fluid.n_region, scene->bed.n_region, scene->fluid.n_size};
-    static const char *const name[3] = {"fluid.regions", "bed.regions", "fluid.sizes"};
-    for (int l = 0; l < 3; l++)
+    const int count[4] = {scene->fluid.n_region, scene->bed.n_region, scene->fluid.n_size, scene->grains.n_fill};
+    static const char *const name[4] = {"fluid.regions", "bed.regions", "fluid.sizes", "grains.regions"};
+    for (int l = 0; l < 4; l++)
         for (int i = 0; i < count[l]; i++) {
             char *path = silt_text("%s.%d", name[l], i);
-            settle_outline(reader, scene, list[l] ? &list[l][i] : &scene->fluid.size_at[i].region, path);
+            settle_outline(reader, scene,
+                           l == 0   ? &scene->fluid.region[i]
+                           : l == 1 ? &scene->bed.region[i]
+                           : l == 2 ? &scene->fluid.size_at[i].region
+                                    : &scene->grains.fill[i].region,
+                           path);
             free(path);
         }
 }
@@ -337,9 +341,82 @@ static void settle_fluid(silt_reader *reader, silt_scene *scene) {
     settle_formula(reader, scene, &fluid->force, "fluid.body_force");
 }
 
+// bed --------------------------------------------------------------------------------------------------
+static void settle_bed(silt_reader *reader, silt_scene *scene) {
+    silt_bed_def *bed = &scene->bed;
+    const silt_tree *node = silt_tree_item(reader->root, "bed");
+    if (!bed->on || !node)
+        return;
+    const silt_tree *law = silt_tree_item(node, "law"), *shear = silt_tree_item(node, "shear");
+    const bool work = bed->law == BED_FRICTIONAL_WORK || bed->law == BED_DISSIPATION;
+    if (bed->shear == SHEAR_DEFAULT)
+        bed->shear = bed->law == BED_FRICTIONAL_WORK ? SHEAR_PAPER
+                     : bed->law == BED_DISSIPATION   ? SHEAR_GRADIENT
+                                                     : SHEAR_LOG_LAW;
+    if (scene->fluid.on && scene->fluid.viscosity == 0 && (bed->law == BED_SHIELDS || (work && bed->shear == SHEAR_LOG_LAW)))
+        silt_complain(reader, bed->law == BED_SHIELDS ? law : shear,
+                      "key 'bed.%s': found '%s' in water without viscosity, allowed with fluid.viscosity > 0",
+                      bed->law == BED_SHIELDS ? "law" : "shear", bed->law == BED_SHIELDS ? "shields" : "log-law");
+    if (scene->fluid.on && bed->law == BED_SHIELDS &&
+        (bed->density <= scene->fluid.density || silt_length(3, scene->gravity) == 0))
+        silt_complain(reader, law, "key 'bed.law': found 'shields' for a bed that has no weight in the water, allowed with gravity and "
+                                   "bed.density > fluid.density");
+}
+
+// grains that fill regions -----------------------------------------------------------------------------
+// the sieve's columns in this order, diameters > 0, shares that rise from 0 to 1
+static void settle_sieve(silt_reader *reader, const silt_tree *item, const char *path, silt_series *sieve) {
+    static const char *const name[2] = {"diameter", "passing"};
+    if (!settle_columns(reader, item, path, sieve, name, 2, 2, false) || !settle_finite(reader, item, path, sieve))
+        return;
+    settle_order(sieve, name, 2, false);
+    const double *row = sieve->value;
+    const int n = sieve->n_row;
+    for (int i = 0; i < n; i++) {
+        const char *fault = !(row[2 * i] > 0)                                  ? "a diameter that is not > 0"
+                            : i > 0 && !(row[2 * i] > row[2 * i - 2])          ? "a diameter that does not rise"
+                            : i > 0 && !(row[2 * i + 1] >= row[2 * i - 1])     ? "a share that falls"
+                            : i == 0 && row[1] != 0                            ? "a first share that is not 0"
+                            : i == n - 1 && (n < 2 || row[2 * i + 1] != 1)     ? "a last share that is not 1"
+                                                                               : NULL;
+        if (fault) {
+            silt_complain(reader, item, "key '%s': found %s in %s:%d, allowed two rows or more with rising diameters in m and the "
+                          "share that passes, from 0 to 1", path, fault, sieve->path, sieve->line[i]);
+            return;
+        }
+    }
+}
+
+static void settle_fills(silt_reader *reader, silt_scene *scene) {
+    for (int i = 0; i < scene->grains.n_fill; i++) {
+        silt_fill_def *fill = &scene->grains.fill[i];
+        const silt_tree *node = silt_tree_find(reader->root, "grains.regions.%d", i);
+        const silt_tree *sieve = silt_tree_item(node, "sieve"), *diameter = silt_tree_item(node, "diameter");
+        const silt_tree *count = silt_tree_item(node, "count");
+        if (!node || node->kind != TREE_MAPPING)
+            continue;
+        const bool both = sieve && fill->diameter > 0;
+        if (both)
+            silt_complain_key(reader, sieve, "key 'grains.regions.%d.sieve': found it beside a diameter, allowed only one of them", i);
+        else if (!sieve && fill->diameter == 0)
+            silt_complain(reader, diameter ? diameter : node,
+                          "key 'grains.regions.%d.diameter': found %s, allowed a number in m, > 0, or a sieve", i,
+                          diameter ? "0 without a sieve" : "neither diameter nor sieve");
+        if (fill->count > 0 && fill->porosity > 0)
+            silt_complain_key(reader, count, "key 'grains.regions.%d.count': found it beside a porosity, allowed only one of them", i);
+        if (sieve && !both && fill->sieve.n_row) {
+            char *path = silt_text("grains.regions.%d.sieve", i);
+            settle_sieve(reader, sieve, path, &fill->sieve);
+            free(path);
+        }
+    }
+}
+
 void silt_scene_settle(silt_reader *reader, silt_scene *scene) {
     settle_regions(reader, scene);
     for (int i = 0; i < scene->n_wall; i++)
         settle_wall(reader, scene, &scene->wall[i], i);
     settle_fluid(reader, scene);
+    settle_bed(reader, scene);
+    settle_fills(reader, scene);
 }
