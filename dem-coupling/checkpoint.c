@@ -141,7 +141,8 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     c->next_id = r.number[3];
     c->left_count = r.number[4];
     c->left_mass = r.left;
-    c->n_grain = c->n_last = (int)r.number[0];
+    c->n_grain = (int)r.number[0];
+    c->n_last = 0;
     c->sent_id = r.number[3];
     c->frozen.count = (int)r.number[1];
     SILT_RESERVE(c->grain, c->grain_capacity, c->n_grain);
@@ -151,7 +152,9 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     for (int i = 0; i < c->n_grain; i++) {
         c->grain[i].sent = true;
         c->grain[i].near = -1;
-        c->last[i] = c->grain[i].id;
+        c->grain[i].fixed = coupling_fixes(c, c->grain[i].id);
+        if (!c->grain[i].fixed)
+            c->last[c->n_last++] = c->grain[i].id;
     }
     for (int i = 0; i < c->frozen.count; i++)
         c->frozen.sphere[i].sent = true;

@@ -21,15 +21,13 @@ static double coupling_rayleigh(const silt_contact_def *contact, double radius, 
     return silt_dem_rayleigh(radius, density, contact->youngs_modulus, contact->poissons_ratio);
 }
 
-// a crumb of the bed becomes a sphere that the time step can bear: larger than its mass asks for, see coupling_burden
+// a crumb of the bed becomes a sphere that the time step can bear: larger than its mass asks for, see silt_coupling_burden
 static double coupling_parcel_radius(const silt_coupling *c, double mass) {
     double radius = cbrt(6.0 * c->width * mass / c->scene->bed.density / M_PI) / 2.0;
     return silt_max(radius, parcel_least * c->parcel);
 }
 
-// mass of the sphere over the mass that it stands for in the slab: 1, more for a crumb; forces on it are scaled alike,
-// so that it moves as the crumb would
-static double coupling_burden(const silt_coupling *c, const coupling_grain *g) {
+double silt_coupling_burden(const silt_coupling *c, const coupling_grain *g) {
     double crumb = parcel_least * c->parcel;
     if (c->parcel <= 0.0 || g->radius > crumb)
         return 1.0;
@@ -136,6 +134,8 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     c->exchange.density = scene->fluid.density;
     c->exchange.viscosity = scene->fluid.viscosity;
     c->exchange.refresh = true;
+    c->exchange.force.def = (silt_force_def){grains->added_mass, scene->fluid.theta, grains->viscous_force,
+                                             grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     for (int k = 0; k < 2; k++)
         c->exchange.gravity[k] = scene->gravity[k];
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
@@ -373,7 +373,11 @@ static bool coupling_find(silt_coupling *c, const silt_nodes *nodes, const silt_
         to->mass = g->mass;
         to->diameter = g->diameter;
         to->number = g->number;
+        memcpy(to->spin, g->omega, sizeof to->spin);
+        to->gyration = sqrt(0.4) * g->radius;
+        to->held = g->fixed;
         to->force[0] = to->force[1] = 0.0;
+        memset(to->torque, 0, sizeof to->torque);
         to->cell = coupling_locate(c, g, nodes, mesh, &located, to->weight);
         c->wet = c->wet || to->cell >= 0;
     }
@@ -410,9 +414,13 @@ static void coupling_load(silt_coupling *c, const silt_nodes *nodes, const silt_
         silt_exchange_load(&c->exchange, nodes->v, nodes->p, dt);
     else
         c->exchange.totals = (silt_exchange_totals){0};
-    for (int i = 0; i < c->n_grain; i++)
+    for (int i = 0; i < c->n_grain; i++) {
+        const bool loaded = c->wet && i < c->n_loaded;
         for (int k = 0; k < 2; k++)
-            c->grain[i].force[k] = c->wet && i < c->n_loaded ? c->exchange.grain[i].force[k] : 0.0;
+            c->grain[i].force[k] = loaded ? c->exchange.grain[i].force[k] : 0.0;
+        for (int k = 0; k < 3; k++)
+            c->grain[i].torque[k] = loaded ? c->exchange.grain[i].torque[k] : 0.0;
+    }
 }
 
 static void coupling_exchanged(const silt_coupling *c, silt_exchanged *exchanged) {
@@ -441,9 +449,9 @@ static void coupling_add(silt_coupling *c) {
                 continue;
             silt_dem_sphere *s = &c->add[n++];
             *s = (silt_dem_sphere){.id = g->id,
-                                   .kind = DEM_GRAIN,
+                                   .kind = g->fixed ? DEM_FROZEN : DEM_GRAIN,
                                    .radius = g->radius,
-                                   .density = coupling_sphere_density(c, g->mass, g->radius) * coupling_burden(c, g)};
+                                   .density = coupling_sphere_density(c, g->mass, g->radius) * silt_coupling_burden(c, g)};
             memcpy(s->x, g->x, sizeof s->x);
             memcpy(s->v, g->v, sizeof s->v);
             memcpy(s->omega, g->omega, sizeof s->omega);
@@ -483,8 +491,9 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
         while (k < c->n_last && c->last[k] < g->id)
             k++;
         for (int d = 0; d < 2 && k < c->n_last && c->last[k] == g->id; d++)
-            c->force[3 * k + d] = g->force[d] * c->width * coupling_burden(c, g);
+            c->force[3 * k + d] = g->force[d] * c->width * silt_coupling_burden(c, g);
     }
+    silt_coupling_twist(c);
     for (int i = 0; i < c->bodies->count; i++)
         for (int k = 0; k < 3; k++) {
             c->body_force[3 * i + k] = c->bodies->body[i].force[k] * c->width;
@@ -558,7 +567,7 @@ static silt_status coupling_complete(const silt_coupling *c, const silt_dem_stat
         const coupling_grain *g = &c->grain[i];
         while (k < state->n_grain && state->id[k] < g->id)
             k++;
-        if ((k == state->n_grain || state->id[k] != g->id) && !coupling_left_domain(c, g))
+        if (!g->fixed && (k == state->n_grain || state->id[k] != g->id) && !coupling_left_domain(c, g))
             return silt_fail(
                 err, SILT_FAILED,
                 "grain %lld vanished: last seen at (%g, %g) with the velocity (%g, %g) m/s and the radius %g m; it "
@@ -580,7 +589,9 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
         coupling_grain *g = &c->grain[i];
         while (k < state->n_grain && state->id[k] < g->id)
             k++;
-        if (k < state->n_grain && state->id[k] == g->id) {
+        if (g->fixed) {
+            silt_coupling_hold(c, g);
+        } else if (k < state->n_grain && state->id[k] == g->id) {
             coupling_receive(c, g, state, k);
             if (coupling_leaves(&c->scene->fluid, g->old_x, g->x, 0.0))
                 coupling_leave(c, g);
@@ -670,6 +681,9 @@ static void coupling_listed(silt_coupling *c) {
         g->mass = def->density * g->solid;
         g->diameter = def->diameter;
         g->number = 1.0 / c->width;
+        g->fixed = coupling_fixes(c, g->id);
+        if (g->fixed)
+            memset(g->v, 0, sizeof g->v);
     }
 }
 
@@ -709,8 +723,8 @@ static void coupling_close(silt_coupling **coupling) {
     coupling_view *w = c->view;
     void *owned[] = {w->contact, w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
-                     c->body,     c->body_force, c->body_torque, c->force, c->add,    c->wall_motion, c->moving,
-                     c->centre,   c->towards,    c->pivot,       c->rate};
+                     c->body,     c->body_force, c->body_torque, c->force, c->add,    c->torque,
+                     c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);

@@ -28,6 +28,7 @@ struct silt_dem {
     int n_remove, cap_remove, n_add, cap_add;
     int64_t *remove;      // owned
     silt_dem_sphere *add; // owned
+    const double *torque; // borrowed, of the next run, NULL: none
     double (*rate)[3]; // owned, velocity and spin of every motion
     int n_solid, cap_solid, n_free, n_free_sphere;
     dem_solid *solid; // owned
@@ -170,7 +171,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->no_contacts = def->no_contacts;
     s->n_body = bodies ? dem->n_free : 0;
     s->n_body_sphere = bodies ? dem->n_free_sphere : 0;
-    s->n_remove = s->n_add = s->n_force = 0;
+    s->n_remove = s->n_add = s->n_force = s->n_torque = 0;
     s->max_grain = max_grain;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
@@ -528,6 +529,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     s->n_remove = dem->n_remove;
     s->n_add = dem->n_add + n_fixed;
     s->n_force = force ? dem->state.n_grain : 0;
+    s->n_torque = dem->torque ? dem->state.n_grain : 0;
     s->max_grain = n_grain + dem->n_add;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
@@ -537,6 +539,9 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     // the layout may have moved: walls and bodies stand before what changes length
     if (force)
         memcpy(DEM_SECTION(s, double, force), force, 3 * (size_t)dem->state.n_grain * sizeof(double));
+    if (dem->torque)
+        memcpy(DEM_SECTION(s, double, torque), dem->torque, 3 * (size_t)s->n_torque * sizeof(double));
+    dem->torque = NULL;
     for (int k = 0; k < dem->n_solid; k++) {
         if (dem->solid[k].slot < 0)
             continue;
@@ -548,6 +553,8 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     }
     return dem_link_send(&dem->link, DEM_RUN, err);
 }
+
+void silt_dem_twist(silt_dem *dem, const double *torque) { dem->torque = torque; }
 
 void silt_dem_keep(silt_dem *dem) {
     dem->keep = true;

@@ -85,6 +85,8 @@ silt_status silt_dem_add_body(silt_dem *dem, const silt_dem_body *body, silt_err
  * springs) of the contacts out of its first half substep; see silt_dem_keep. */
 silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const double *body_force,
                            const double *body_torque, silt_error *err);
+/** Torques on the grains in the next run, 3 per grain in the order of the last state, N m; borrowed until then */
+void silt_dem_twist(silt_dem *dem, const double *torque);
 /** How the walls that move do so in the next runs, as stiff pieces: 3 numbers per motion, velocity in m/s and spin in rad/s; and where
  * they stand at the end of the next run, 4 numbers per wall as in the definition. */
 void silt_dem_move_walls(silt_dem *dem, const double (*rate)[3], const double (*wall)[4]);

@@ -47,6 +47,13 @@ static inline void exchange_slope(const silt_exchange *e, const exchange_cell *c
     }
 }
 
+void silt_exchange_slope(const silt_exchange *e, int near, double slope[4][3]) {
+    double flat[3][2];
+    exchange_slope(e, &e->cell[near], flat);
+    for (int a = 0; a < 3; a++)
+        memcpy(slope[a], flat[a], sizeof flat[a]);
+}
+
 // Velocity and pressure gradient as grains feel them: sum_i w_ip u_i is the value of H^-1 M u at a grain, and that of
 // H^-1 sum_e A_e/3 grad p_e the gradient. One solve for both. water: velocity and pressure at the nodes that are looked at
 static void exchange_smooth(silt_exchange *e, const double (*water)[3]) {
@@ -93,14 +100,16 @@ static void exchange_pack(silt_exchange *e, double dt) {
             }
             diameter[i] = g->diameter;
             number[i] = idle ? 0.0 : g->number;
-            to->pace[i] = dt / g->mass;
+            to->pace[i] = g->held ? 0.0 : dt / g->mass;
             to->solid[i] = idle ? 0.0 : g->solid;
             for (int k = 0; k < 2; k++) {
                 to->v[k][i] = g->v[k];
-                to->start[k][i] = g->v[k] + dt * e->gravity[k] + to->pace[i] * g->contact[k];
+                to->start[k][i] = g->v[k] + (g->held ? 0.0 : dt * e->gravity[k] + to->pace[i] * g->contact[k]);
             }
         }
         silt_drag_numbers(e->law, e->density, e->viscosity, diameter, number, solid, to->number);
+        if (silt_forces_on(&e->force))
+            silt_force_pack(e, m, dt);
     }
 }
 
@@ -118,7 +127,8 @@ VECTOR_INLINE void exchange_feel(const double *read, const exchange_group *g, ei
 
 // Free velocity and drag of every grain, with new coefficients when `renew`; what it gives is added to the nodes. Eight grains at a
 // time: ten thousand take 0.3 ms, one by one 0.7 ms.
-VECTOR_CLONES static void exchange_give(const silt_exchange *e, bool renew) {
+VECTOR_CLONES static void exchange_give(silt_exchange *e, bool renew) {
+    const bool more = silt_forces_on(&e->force);
     for (int m = 0; m < e->n_group; m++) {
         exchange_group *g = &e->group[m];
         eight felt[READ_FIELDS], *v = (eight *)g->v, *start = (eight *)g->start, *free_v = (eight *)g->free;
@@ -138,6 +148,8 @@ VECTOR_CLONES static void exchange_give(const silt_exchange *e, bool renew) {
             give[GIVE_PUSH + k] = *effective * free_v[k];
             give[GIVE_FLUX + k] = solid * (v[k] + end) / 2.0;
         }
+        if (more)
+            silt_force_give(e, m, (const double *)felt, (double *)give);
         for (int i = 0; i < DRAG_GROUP; i++) {
             const eight one = {give[0][i], give[1][i], give[2][i], give[3][i], give[4][i]};
             for (int a = 0; a < 3; a++)
@@ -148,6 +160,7 @@ VECTOR_CLONES static void exchange_give(const silt_exchange *e, bool renew) {
 
 // forces on all grains in the water, eight at a time, and their sums
 VECTOR_CLONES static void exchange_force(silt_exchange *e, silt_exchange_totals *t) {
+    const bool more = silt_forces_on(&e->force);
     eight drag_sum[2] = {{0.0}}, pressure_sum[2] = {{0.0}}, size = {0.0};
     for (int m = 0; m < e->n_group; m++) {
         const exchange_group *g = &e->group[m];
@@ -158,6 +171,9 @@ VECTOR_CLONES static void exchange_force(silt_exchange *e, silt_exchange_totals 
         for (int k = 0; k < 2; k++) {
             pressure[k] = -solid * felt[READ_GRADIENT + k];
             drag[k] = effective * (felt[READ_VELOCITY + k] - free_v[k]);
+            if (more)
+                drag[k] = *(const eight *)e->force.group[m].coefficient * felt[READ_VELOCITY + k] -
+                          *(const eight *)e->force.group[m].push[k];
             drag_sum[k] += drag[k];
             pressure_sum[k] += pressure[k];
         }
@@ -172,6 +188,10 @@ VECTOR_CLONES static void exchange_force(silt_exchange *e, silt_exchange_totals 
                 to->pressure[k] = pressure[k][i];
                 to->force[k] = drag[k][i] + pressure[k][i];
             }
+            for (int k = 0; k < (more ? 3 : 0); k++)
+                to->torque[k] = 0.0;
+            if (e->force.def.spin)
+                to->torque[2] = e->force.group[m].torque[0][i];
         }
     }
     for (int i = 0; i < DRAG_GROUP; i++) {
@@ -233,10 +253,14 @@ static void exchange_update(void *self, const double *velocity, const double *pr
         exchange_pack(e, dt);
     exchange_midpoint(e, dt);
     exchange_smooth(e, (const double(*)[3])e->seen);
+    if (silt_forces_sheared(&e->force))
+        silt_force_fields(e);
     memset(e->give, 0, GIVE_FIELDS * ((size_t)e->n_look + 1) * sizeof *e->give);
     exchange_give(e, e->refresh || fresh);
     silt_kernel_solve(&e->kernel, GIVE_FIELDS, e->give);
     exchange_take(e);
+    if (e->force.def.spin)
+        silt_force_couple(e);
     exchange_source(e);
     e->dt = dt;
 }
@@ -387,7 +411,9 @@ void silt_exchange_begin(silt_exchange *e, const silt_nodes *nodes, double dt) {
     memset(e->push, 0, 2 * (size_t)e->n_node * sizeof *e->push);
     memset(e->source, 0, (size_t)e->n_node * sizeof *e->source);
     e->dt = NAN; // whatever dt is, the coefficients are of another step
+    e->force.starting = true;
     exchange_update(e, nodes->v, nodes->p, dt);
+    e->force.starting = false;
 }
 
 silt_status silt_exchange_prepare(silt_exchange *e, const silt_nodes *nodes, const silt_mesh *mesh, double dt,
@@ -405,8 +431,8 @@ void silt_exchange_load(silt_exchange *e, const double *velocity, const double *
     // the pressure on the grains acts where the water's does: on the mesh of the last iterate
     exchange_midpoint(e, dt);
     exchange_gather(e, velocity, pressure, e->spare);
-    for (int m = 0; m < e->kernel.n_node; m++)
-        for (int k = 0, i = e->kernel.node[m]; k < 2; k++)
+    for (int m = 0; m < e->n_look; m++)
+        for (int k = 0, i = e->look[m]; k < 2; k++)
             t->water[k] += e->push[2 * i + k] - e->coefficient[i] * e->spare[m][k];
 
     // drag as the water felt it: accepted velocity, free velocity of the last update
@@ -416,6 +442,7 @@ void silt_exchange_load(silt_exchange *e, const double *velocity, const double *
 
 void silt_exchange_clear(silt_exchange *e) {
     silt_kernel_clear(&e->kernel);
+    silt_forces_clear(&e->force);
     free(e->grain);
     free(e->solid);
     free(e->coefficient);

@@ -11,6 +11,7 @@
 #define SILT_EXCHANGE_H
 
 #include "drag.h"
+#include "force.h"
 #include "kernel.h"
 
 typedef struct silt_exchange_grain {
@@ -21,6 +22,9 @@ typedef struct silt_exchange_grain {
     double diameter;   // m, of the grains that the drag law sees
     double number;     // 1/m, how many of these the parcel is, per metre of width
     double contact[2]; // N/m, of contacts in the last step
+    double spin[3];    // 1/s; looked at where there is a torque on it
+    double gyration;   // m, radius of gyration of the sphere that spins, sqrt(0.4) times its radius
+    bool held;         // stays as fast as it is, whatever acts on it
     int cell;          // of the water's mesh, -1: not in the water
     double weight[3];  // barycentric, in that cell
     // results of load
@@ -29,31 +33,32 @@ typedef struct silt_exchange_grain {
     double free[2];     // m/s, v_free of the last update
     double pressure[2]; // N/m, force of the pressure gradient
     double force[2];    // N/m, all of the water's force; out of the water as it was before
+    double torque[3];   // N m/m, the water's, where it is asked for
 } silt_exchange_grain;
 
 /** what passed between grains and water in a step, N per m of width */
 typedef struct silt_exchange_totals {
     double pressure[2]; // of the pressure gradient on grains
-    double drag[2];     // of drag on grains
-    double water[2];    // of drag on the water: sum over nodes of push - coefficient u; minus drag to rounding
+    double drag[2];     // of drag on grains, and of all other forces but the pressure gradient's
+    double water[2];    // of these on the water: sum over nodes of push - coefficient u; minus drag to rounding
     double size;        // sum over grains of the magnitudes of both parts
 } silt_exchange_totals;
 
 /** a cell of the water near to grains */
 typedef struct exchange_cell {
-    int at[3];    // corners, among the nodes that are looked at
+    int at[4];    // corners, among the nodes that are looked at
     double least; // m2, twice the area below which the cell counts as at the start of the step
 } exchange_cell;
 
 /** eight grains in the water: what a step's updates read and write of them */
 typedef struct exchange_group {
-    int place[DRAG_GROUP][3];      // of the corners of the grain's cell, in the kernel's order
-    double weight[DRAG_GROUP][3];
+    int place[DRAG_GROUP][4];      // of the corners of the grain's cell, in the kernel's order
+    double weight[DRAG_GROUP][4];
     double number[DRAG_NUMBERS][DRAG_GROUP]; // of the drag law
     double pace[DRAG_GROUP];                 // s m/kg, dt/m
-    double solid[DRAG_GROUP], v[2][DRAG_GROUP];
-    double start[2][DRAG_GROUP];             // m/s, v_free but for the pressure
-    double factor[DRAG_GROUP], effective[DRAG_GROUP], free[2][DRAG_GROUP];
+    double solid[DRAG_GROUP], v[3][DRAG_GROUP];
+    double start[3][DRAG_GROUP];             // m/s, v_free but for the pressure
+    double factor[DRAG_GROUP], effective[DRAG_GROUP], free[3][DRAG_GROUP];
 } exchange_group;
 
 typedef struct silt_exchange {
@@ -62,6 +67,7 @@ typedef struct silt_exchange {
     double density, viscosity; // of the water
     double gravity[2];
     double width; // m, of the kernel
+    silt_forces force; // its def; forces besides drag and pressure gradient
     bool refresh; // update also renews the coefficients; the fluid must then read them anew
     // given before prepare
     int n_grain, grain_capacity;
@@ -113,6 +119,8 @@ silt_status silt_exchange_prepare(silt_exchange *exchange, const silt_nodes *nod
 /** Final forces on the grains and the totals, from the accepted velocity (that the mesh moves with, as in update) and
  * pressure. Coefficients, free velocities and cells are those of the last update: what the water felt. */
 void silt_exchange_load(silt_exchange *exchange, const double *velocity, const double *pressure, double dt);
+/** A third (space: a quarter) of a near cell's measure times the gradients of its shape functions, at the middle of the step */
+void silt_exchange_slope(const silt_exchange *exchange, int near, double slope[4][3]);
 void silt_exchange_clear(silt_exchange *exchange);
 
 #endif

@@ -18,12 +18,14 @@ typedef struct coupling_grain {
     double radius, mass, solid; // m, kg/m, m3/m
     double diameter, number;    // for drag: m, grains per metre of width
     double force[2];            // N/m, the water's
+    double torque[3];           // N m/m, the water's, where it is asked for
     double contact[2], net;     // N/m, of the last step
     double old_x[2], old_v[2];  // before the substeps
     int contacts;
     int near; // a node of the water next to it when it was last located, -1: none
     uint8_t on_bed;
     bool sent, gone; // LIGGGHTS has it; it was deposited or left
+    bool fixed;      // held where it is: frozen for LIGGGHTS
 } coupling_grain;
 
 /** what grains() shows: borrowed by the caller, remade when it is stale */
@@ -79,8 +81,9 @@ struct silt_coupling {
     coupling_body *body;              // owned, as many as in the scene
     silt_body_state *bodies;          // owned
     double *body_force, *body_torque; // owned, 3 per body, N and N m of the slab
-    int force_capacity, add_capacity;
+    int force_capacity, torque_capacity, add_capacity;
     double *force;        // owned, 3 per grain, N
+    double *torque;       // owned, 3 per grain, N m; NULL where the water exerts none
     silt_dem_sphere *add; // owned
     double elapsed;       // s, of the running substeps
     double contact[2];    // N/m, of contacts on all grains, of the last substeps
@@ -89,6 +92,20 @@ struct silt_coupling {
     silt_error refused; // why a release cannot be; returned by the next start
 };
 
+/** grains.fixed holds the grain with this id: it is one of those of the start, which come first */
+static inline bool coupling_fixes(const silt_coupling *c, int64_t id) {
+    return c->scene->grains.fixed && id <= silt_scene_grains(c->scene);
+}
+
+/** mass of the sphere over the mass that it stands for in the slab: 1, more for a crumb; forces on it are scaled alike, so that it
+ * moves as the crumb would */
+double silt_coupling_burden(const silt_coupling *coupling, const coupling_grain *grain);
+
+// walk.c
+/** What holds a fixed grain against water and weight counts as contact. */
+void silt_coupling_hold(silt_coupling *coupling, coupling_grain *grain);
+/** The water's torques on grains for the next substeps; nothing where grains.rotational_drag is off. */
+void silt_coupling_twist(silt_coupling *coupling);
 // walls.c
 void silt_coupling_walls(silt_coupling *coupling);       /**< which of them move, and where all are */
 void silt_coupling_walls_stand(silt_coupling *coupling); /**< where the walls are now is where LIGGGHTS has them */

@@ -184,7 +184,7 @@ static const char *worker_path(int fd) {
 // ---- LIGGGHTS' arrays
 typedef struct worker_atoms {
     int n, *tag, *type;
-    double **x, **v, **omega, **force, *radius, *mass;
+    double **x, **v, **omega, **force, **torque, *radius, *mass;
 } worker_atoms;
 
 static worker_atoms worker_look(void) {
@@ -195,6 +195,7 @@ static worker_atoms worker_look(void) {
                       .v = lammps_extract_atom(worker.lmp, "v"),
                       .omega = lammps_extract_atom(worker.lmp, "omega"),
                       .force = lammps_extract_atom(worker.lmp, "f"),
+                      .torque = lammps_extract_atom(worker.lmp, "torque"),
                       .radius = lammps_extract_atom(worker.lmp, "radius"),
                       .mass = lammps_extract_atom(worker.lmp, "rmass")};
     return a;
@@ -390,7 +391,7 @@ static void worker_bodies(void) {
 static void worker_load(void) {
     dem_shared *s = worker.shared;
     worker_atoms a = worker_look();
-    const double *force = DEM_SECTION(s, const double, force);
+    const double *force = DEM_SECTION(s, const double, force), *torque = DEM_SECTION(s, const double, torque);
     const dem_body *body = DEM_SECTION(s, const dem_body, body);
     double **f = lammps_extract_fix(worker.lmp, "dragforce", 1, 2, 0, 0),
            **t = lammps_extract_fix(worker.lmp, "hdtorque", 1, 2, 0, 0);
@@ -401,12 +402,16 @@ static void worker_load(void) {
     for (int i = 0; i < a.n; i++) {
         for (int c = 0; c < 2; c++)
             a.force[i][c] -= f[i][c];
+        if (a.type[i] == DEM_TYPE_GRAIN)
+            a.torque[i][2] -= t[i][2];
         memset(f[i], 0, 3 * sizeof(double)), memset(t[i], 0, 3 * sizeof(double));
     }
     for (int k = 0; k < s->n_force && k < worker.n_order; k++) {
         int i = worker_find(worker.order[k]);
         if (i >= 0 && a.type[i] == DEM_TYPE_GRAIN)
             memcpy(f[i], &force[3 * k], 2 * sizeof(double));
+        if (i >= 0 && a.type[i] == DEM_TYPE_GRAIN && k < s->n_torque)
+            a.torque[i][2] += t[i][2] = torque[3 * k + 2];
     }
     // a run that goes on begins with the sum of forces at the last one's end: the old load goes out of it, the new one comes in
     for (int i = 0; i < a.n; i++)

@@ -56,7 +56,7 @@ void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, i
     for (int s = 0; s < samples; s++) {
         int number = entry[samples > 1 ? (int)((long)s * (n_frame - 1) / (samples - 1)) : 0].number;
         static const char *const part[] = {"fluid", "bed", "grains", "bodies"};
-        for (int k = 0; k < (c->slice ? 1 : 4); k++) {
+        for (int k = 0; k < (c->slice ? 2 : 4); k++) {
             silt_grid grid;
             const char *array = k == 0 ? c->field->water : k == 1 ? c->field->bed : k == 2 ? draw_grain_array(c) : NULL;
             if (!silt_draw_read(c, &grid, part[k], number, array))
@@ -77,7 +77,7 @@ void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, i
             silt_draw_range(c, &grid, counts);
             free(counts);
             silt_grid_clear(&grid);
-            if (k == 1 && silt_grid_read(&grid, c->out, part[k], number, "CellData/density")) {
+            if (k == 1 && !c->slice && silt_grid_read(&grid, c->out, part[k], number, "CellData/density")) {
                 for (int i = 0; i < grid.n_cell; i++)
                     c->density = silt_max(c->density, grid.value ? grid.value[i] : 0);
                 silt_grid_clear(&grid);
@@ -202,7 +202,8 @@ static void draw_bed(silt_draw_canvas *c, int number) {
     silt_grid grid, cells;
     if (!silt_draw_read(c, &grid, "bed", number, c->field->bed))
         return;
-    bool dense = silt_grid_read(&cells, c->out, "bed", number, "CellData/density") && cells.value;
+    // a cut has other cells
+    bool dense = silt_grid_read(&cells, c->out, "bed", number, "CellData/density") && cells.value && !c->slice;
     cairo_surface_flush(c->surface);
     for (int i = 0; i < grid.n_cell; i++) {
         double density = dense && c->density > 0 ? cells.value[i] / c->density : 1;
@@ -321,8 +322,8 @@ void silt_draw_flat(silt_draw_canvas *c, const silt_frame_entry *entry) {
     cairo_rectangle(c->cr, MARGIN_LEFT, MARGIN_TOP, c->width, c->height);
     cairo_clip(c->cr);
     draw_water(c, entry->number);
+    draw_bed(c, entry->number);
     if (!c->slice) {
-        draw_bed(c, entry->number);
         draw_grains(c, entry->number);
         draw_bodies(c, entry->number);
     }

@@ -257,10 +257,14 @@ static silt_status frame_bed(const char *out, int number, const silt_view *view,
     const silt_bed *bed = view->bed;
     size_t n = (size_t)bed->n_node, cells = (size_t)bed->n_cell;
     int *place = silt_alloc(n + 1, sizeof *place);
-    int64_t *link = silt_alloc(3 * cells + 1, sizeof *link), *offset = silt_alloc(cells + 1, sizeof *offset);
+    const int n_corner = bed->dim == 3 ? 4 : 3;
+    int64_t *link = silt_alloc(4 * cells + 1, sizeof *link), *offset = silt_alloc(cells + 1, sizeof *offset);
     uint8_t *type = silt_alloc(cells + 1, 1);
     double *x = silt_alloc(3 * n + 1, sizeof *x), *work = silt_alloc(n + 1, sizeof *work);
     double *shear = silt_alloc(n + 1, sizeof *shear), *density = silt_alloc(cells + 1, sizeof *density);
+    const bool seeps = bed->pressure != NULL;
+    double *pressure = silt_alloc(seeps ? n + 1 : 1, sizeof *pressure), *seepage = silt_alloc(seeps ? n + 1 : 1, sizeof *seepage);
+    double *darcy = silt_alloc(seeps ? 3 * cells + 1 : 1, sizeof *darcy);
 
     // living nodes only
     int n_point = 0;
@@ -268,17 +272,22 @@ static silt_status frame_bed(const char *out, int number, const silt_view *view,
         if (!bed->alive[i])
             continue;
         place[i] = n_point;
-        x[3 * n_point] = bed->x[i][0];
-        x[3 * n_point + 1] = bed->x[i][1];
+        memcpy(x + 3 * n_point, bed->x[i], sizeof bed->x[i]);
         work[n_point] = bed->work[i];
+        if (seeps) {
+            pressure[n_point] = bed->pressure[i];
+            seepage[n_point] = bed->seepage[i];
+        }
         shear[n_point++] = bed->shear[i];
     }
     for (int i = 0; i < bed->n_cell; i++) {
-        for (int k = 0; k < 3; k++)
-            link[3 * i + k] = place[bed->cell[i][k]];
-        offset[i + 1] = 3 * (i + 1);
-        type[i] = VTK_TRIANGLE;
+        for (int k = 0; k < n_corner; k++)
+            link[n_corner * i + k] = place[bed->cell[i][k]];
+        offset[i + 1] = n_corner * (i + 1);
+        type[i] = n_corner == 4 ? VTK_TETRA : VTK_TRIANGLE;
         density[i] = bed->mass[i] / bed->area[i];
+        for (int d = 0; d < 2 && seeps; d++)
+            darcy[3 * i + d] = bed->darcy[2 * i + d];
     }
 
     frame_file f;
@@ -287,6 +296,14 @@ static silt_status frame_bed(const char *out, int number, const silt_view *view,
     frame_put(&f, f.point, "work", H5T_NATIVE_DOUBLE, (size_t)n_point, 0, work);
     frame_put(&f, f.point, "shear", H5T_NATIVE_DOUBLE, (size_t)n_point, 0, shear);
     frame_put(&f, f.cell, "density", H5T_NATIVE_DOUBLE, cells, 0, density);
+    if (seeps) {
+        frame_put(&f, f.point, "pressure", H5T_NATIVE_DOUBLE, (size_t)n_point, 0, pressure);
+        frame_put(&f, f.point, "seepage", H5T_NATIVE_DOUBLE, (size_t)n_point, 0, seepage);
+        frame_put(&f, f.cell, "darcy", H5T_NATIVE_DOUBLE, cells, 3, darcy);
+    }
+    free(pressure);
+    free(seepage);
+    free(darcy);
     free(place);
     free(link);
     free(offset);

@@ -90,6 +90,13 @@ void silt_run_ledger(silt_run *run) {
         silt_water_moment(nodes, &run->mesh, run->drag ? run->drag->solid : NULL, rho, (const double[3]){0}, ledger->angular_momentum);
     ledger->y_plus = run->fluid.law.n_point ? run->fluid.law.y_plus[1] : NAN;
     ledger->bed_mass = run->bed.solid_mass;
+    ledger->bed_shear = ledger->bed_work = 0;
+    for (int k = 0; k < run->bed.n_node; k++)
+        if (run->bed.exposed[k]) {
+            ledger->bed_shear = silt_max(ledger->bed_shear, run->bed.shear[k]);
+            ledger->bed_work = silt_max(ledger->bed_work, run->bed.work[k]);
+        }
+    ledger->bed_y_plus = run->bed.y_plus;
     ledger->pore_water_mass = run->bed.pore_water;
     ledger->grain_count = 0;
     ledger->grain_mass = 0;
