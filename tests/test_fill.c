@@ -251,7 +251,6 @@ static void test_heap(void **state) {
     double x[3 * N] = {0}, v[3 * N] = {0}, radius[N], mass[N], spin[3 * N] = {0}, force[3 * N] = {0};
     int64_t id[N];
     for (int i = 0; i < N; i++) {
-        // the last grain of the heap is a twentieth of the radii's sum away, the next grain a fifth
         x[3 * i] = 0.15 + 0.3 * i;
         x[3 * i + 1] = 2 - 0.15 * i;
         radius[i] = 0.3354102 / 2;
