@@ -15,19 +15,19 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     bool has_bodies = scene->n_body > 0;
     if (scene->dimension == 3) {
         // the others were refused already
-        grains = bodies = NULL;
+        bodies = NULL;
         if (!fluid)
             silt_complain(
                 reader, root,
-                "key 'fluid': found no water, allowed a scene with fluid: the rest is two-dimensional so far");
+                "key 'fluid': found no water, allowed a scene with fluid: in three dimensions grains come with water so far");
     } else if (!fluid && !grains && !has_bodies && !bodies)
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
                       "one of fluid, grains, bodies");
-    const bool fixed = isinf(scene->bed.work) && !grains; // a bed that gives nothing needs no grains
+    const bool fixed = !silt_bed_erodes(&scene->bed) && !grains; // a bed that gives nothing needs no grains
     if (bed && !grains && !fixed)
         silt_complain_key(reader, bed,
-                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}, or with work: .inf: "
+                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}, or one that gives nothing (work: .inf): "
                           "eroded bed becomes grains");
     if (bed && scene->grains.on && !silt_tree_item(grains, "parcel"))
         silt_complain_key(reader, grains,
