@@ -15,6 +15,7 @@ struct silt_gauges {
     double (*span)[2]; // owned, one per cell: part of a section in the cell
     int *span_cell;    // owned
     int main;          // lowest node of the largest group, -1
+    silt_heap heap;    // of grains
 };
 
 silt_status silt_gauges_create(silt_gauges **gauges, const silt_view *start, silt_error *err) {
@@ -39,6 +40,7 @@ void silt_gauges_free(silt_gauges **gauges) {
     free(g->volume);
     free(g->span);
     free(g->span_cell);
+    silt_heap_clear(&g->heap);
     free(g);
     *gauges = NULL;
 }
@@ -526,7 +528,8 @@ static void gauge_water(silt_gauges *g, const silt_view *view, const silt_gauge_
             value[0] = 0;
             for (int k = 0; k < 4; k++)
                 value[0] += weight[k] * view->nodes->p[node[k]];
-        }
+        } else if (view->bed)
+            silt_seep_pressure_at(view->bed, def->from, value);
         break;
     case GAUGE_VELOCITY:
         if (gauge_point(view, def->from, node, weight)) {
@@ -556,7 +559,7 @@ static void gauge_water(silt_gauges *g, const silt_view *view, const silt_gauge_
 }
 
 void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value) {
-    bool water = view->nodes && view->mesh && view->locator, connected = false;
+    bool water = view->nodes && view->mesh && view->locator, connected = false, heap = false;
     for (int i = 0; i < gauges->n_gauge; i++) {
         const silt_gauge_def *def = &view->scene->gauge[i];
         int n = silt_gauge_columns(view->scene, i);
@@ -566,6 +569,11 @@ void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value)
             double level = view->bed ? silt_bed_level(view->bed, def->from) : -HUGE_VAL;
             if (level > -HUGE_VAL)
                 value[0] = def->kind == GAUGE_SCOUR ? gauges->start[i] - level : level;
+        } else if (def->kind == GAUGE_GRAIN_FRONT || def->kind == GAUGE_GRAIN_HEIGHT || def->kind == GAUGE_GRAIN_SLOPE) {
+            if (!heap)
+                silt_heap_find(&gauges->heap, view);
+            heap = true;
+            value[0] = silt_heap_gauge(&gauges->heap, view, def);
         } else if (def->kind == GAUGE_GRAINS) {
             gauge_grains(view, def, value);
         } else if (water) {

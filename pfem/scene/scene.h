@@ -172,6 +172,7 @@ typedef struct silt_fluid_def {
 
 typedef enum { BED_FRICTIONAL_WORK = 1, BED_DISSIPATION, BED_POWER, BED_EXCESS_SHEAR, BED_SHIELDS } silt_bed_law;
 typedef enum { SHEAR_DEFAULT = 0, SHEAR_PAPER, SHEAR_GRADIENT, SHEAR_LOG_LAW } silt_bed_shear;
+typedef enum { SEEPAGE_NONE = 0, SEEPAGE_DARCY, SEEPAGE_KOZENY_CARMAN } silt_seepage;
 typedef struct silt_bed_def {
     bool on;
     double density;   // kg/m3 of the grains' solid, required
@@ -190,6 +191,9 @@ typedef struct silt_bed_def {
     bool slope;       // default true: with repose, the threshold hangs on the slope
     bool cover;       // default true: what resting parcels cover does not wear
     double saturation; // share of the pores that holds water, default 1
+    silt_seepage seepage; // seepage: none | darcy | kozeny-carman
+    double permeability;  // m2, with seepage: darcy
+    bool fluidise;     // seepage that outweighs the grains lifts them off the surface, default true
     bool deposition;   // default true
     silt_condition condition; // of water on the bed, default no-slip
     int n_region;
@@ -300,6 +304,9 @@ typedef enum {
     GAUGE_FORCE,      // force_on: I: force of the water on wall I of the scene: columns NAME_x, NAME_y, NAME_z
     GAUGE_ANGULAR,    // angular_momentum_about: [x, y]; in 3-D columns NAME_x, NAME_y, NAME_z
     GAUGE_CENTROID,   // centroid_of: water: columns NAME_x, NAME_y, NAME_z
+    GAUGE_GRAIN_FRONT,  // grains_front: x | -x: the foremost x of the grains that hang together
+    GAUGE_GRAIN_HEIGHT, // grains_height_at: X (3-D: [x, y]): their top above that place
+    GAUGE_GRAIN_SLOPE,  // grains_slope: [x0, x1]: degrees by which it falls to the right, from x0 = from[0] to x1 = from[1]
     GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
 } silt_gauge_kind;
@@ -403,14 +410,15 @@ int silt_series_column(const silt_series *series, const char *name); /**< column
 /** What silt_series_at needs: two columns or more, finite numbers, column 0 strictly rising. The error names file and line. */
 silt_status silt_series_rising(const silt_series *series, silt_error *err);
 
+/** m, k_s of the bed */
+static inline double silt_bed_roughness(const silt_scene *s) {
+    return s->bed.roughness > 0 ? s->bed.roughness : 2.5 * s->grains.diameter;
+}
+
 /** all grains that are there at the start: the list's, then the regions' */
 static inline int silt_scene_grains(const silt_scene *s) { return s->grains.n_grain + s->grains.n_filled; }
 static inline const silt_grain_def *silt_scene_grain(const silt_scene *s, int i) {
     return i < s->grains.n_grain ? &s->grains.grain[i] : &s->grains.filled[i - s->grains.n_grain];
-}
-/** m, k_s of the bed */
-static inline double silt_bed_roughness(const silt_scene *s) {
-    return s->bed.roughness > 0 ? s->bed.roughness : 2.5 * s->grains.diameter;
 }
 
 /** what a scene needs */
