@@ -154,6 +154,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .period = period_share * 2.0 * largest,
         .gravity = {scene->gravity[0], scene->gravity[1], scene->gravity[2]},
         .youngs_modulus = contact->youngs_modulus,
+        .wall_modulus = contact->wall_modulus,
         .poissons_ratio = contact->poissons_ratio,
         .restitution = contact->restitution,
         .friction = contact->friction,
@@ -231,6 +232,7 @@ static const silt_grain_state *coupling_grains(const silt_coupling *c) {
     SILT_RESERVE(w->net, w->capacity[6], n);
     SILT_RESERVE(w->contacts, w->capacity[7], n);
     SILT_RESERVE(w->on_bed, w->capacity[8], n);
+    SILT_RESERVE(w->contact, w->capacity[9], 3 * n);
     SILT_RESERVE(w->map, w->map_capacity, n);
     for (int i = 0; i < n; i++) {
         const coupling_grain *g = &c->grain[i];
@@ -243,6 +245,7 @@ static const silt_grain_state *coupling_grains(const silt_coupling *c) {
         w->radius[count] = g->radius;
         w->mass[count] = g->mass;
         w->net[count] = g->net;
+        memcpy(w->contact + 3 * count, g->contact, sizeof g->contact);
         w->contacts[count] = g->contacts;
         w->on_bed[count] = g->on_bed;
         w->map[count++] = i;
@@ -256,6 +259,7 @@ static const silt_grain_state *coupling_grains(const silt_coupling *c) {
                                   .mass = w->mass,
                                   .contacts = w->contacts,
                                   .on_bed = w->on_bed,
+                                  .contact = w->contact,
                                   .net_force = w->net};
     w->fresh = true;
     return &w->state;
@@ -707,7 +711,7 @@ static void coupling_close(silt_coupling **coupling) {
     free(c->bodies->body);
     free(c->bodies);
     coupling_view *w = c->view;
-    void *owned[] = {w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
+    void *owned[] = {w->contact, w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
                      c->body,     c->body_force, c->body_torque, c->force, c->add,    c->torque,
                      c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate,

@@ -150,6 +150,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->periodic = def->periodic;
     s->period = def->period;
     s->youngs_modulus = def->youngs_modulus;
+    s->wall_modulus = def->wall_modulus > 0 ? def->wall_modulus : def->youngs_modulus;
     s->poissons_ratio = def->poissons_ratio;
     s->restitution = def->restitution;
     s->friction = def->friction;

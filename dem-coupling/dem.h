@@ -20,6 +20,7 @@ typedef struct silt_dem_def {
     bool periodic;       // in x: what leaves the box there comes in at the other end
     double period;       // m, slab: periodic length in z (at least 3 times the largest sphere's diameter)
     double gravity[3];
+    double wall_modulus; // Pa, of the walls; 0: youngs_modulus
     double youngs_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
     double step; // s, DEM time step, fixed for the run
     int n_wall;

@@ -58,7 +58,7 @@ typedef struct dem_shared {
     // the numbers of silt_dem_def
     int dim, periodic;
     double lo[3], hi[3], period, gravity[3];
-    double youngs_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
+    double youngs_modulus, wall_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
     double step, max_radius, min_radius;
     int resume, no_contacts;
     // lengths of the sections

@@ -32,9 +32,9 @@ typedef struct coupling_grain {
 typedef struct coupling_view {
     silt_grain_state state;
     bool fresh; // shows the grains as they are
-    int capacity[9], map_capacity;
+    int capacity[10], map_capacity;
     int64_t *id;
-    double *x, *v, *omega, *radius, *mass, *net;
+    double *x, *v, *omega, *radius, *mass, *net, *contact;
     int *contacts, *map; // map: index into the grains
     uint8_t *on_bed;
 } coupling_view;

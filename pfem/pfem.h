@@ -375,6 +375,7 @@ typedef struct silt_grain_state {
     const double *mass;      // kg per m of width that the parcel stands for
     const int *contacts;     // number of contacts of the last substep
     const uint8_t *on_bed;   // 1 when one of them is with the bed
+    const double *contact;   // 3 per grain, N per m of width, of contacts, mean of the last step; may be NULL
     const double *net_force; // N per m of width, magnitude, mean of the last step (with gravity and water)
 } silt_grain_state;
 

@@ -59,6 +59,10 @@ int silt_gauge_columns(const silt_scene *scene, int i) {
     case GAUGE_VELOCITY:
     case GAUGE_FORCE:
     case GAUGE_CENTROID:
+    case GAUGE_GRAIN_PLACE:
+    case GAUGE_GRAIN_VELOCITY:
+    case GAUGE_GRAIN_SPIN:
+    case GAUGE_GRAIN_FORCE:
         return 3;
     case GAUGE_GRAINS:
         return 4;
@@ -569,7 +573,9 @@ void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value)
             double level = view->bed ? silt_bed_level(view->bed, def->from) : -HUGE_VAL;
             if (level > -HUGE_VAL)
                 value[0] = def->kind == GAUGE_SCOUR ? gauges->start[i] - level : level;
-        } else if (def->kind == GAUGE_GRAIN_FRONT || def->kind == GAUGE_GRAIN_HEIGHT || def->kind == GAUGE_GRAIN_SLOPE) {
+        } else if (def->kind >= GAUGE_GRAIN_PLACE && def->kind <= GAUGE_GRAIN_FORCE) {
+            silt_grain_gauge(view, def, value);
+        } else if (def->kind >= GAUGE_GRAIN_FRONT && def->kind <= GAUGE_GRAIN_SLOPE) {
             if (!heap)
                 silt_heap_find(&gauges->heap, view);
             heap = true;

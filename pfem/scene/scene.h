@@ -263,7 +263,8 @@ typedef struct silt_grains_def {
 /** contact properties of grains, bodies and walls; block `contact`, required with grains, bed or bodies */
 typedef struct silt_contact_def {
     bool on;
-    double youngs_modulus;   // Pa, 5e6 to 1e9
+    double youngs_modulus;   // Pa, 5e6 to 1e12
+    double wall_modulus;     // Pa, Young's modulus of the walls; default youngs_modulus
     double poissons_ratio;
     double restitution;      // 0.05 to 1
     double friction;
@@ -310,6 +311,10 @@ typedef enum {
     GAUGE_GRAIN_HEIGHT, // grains_height_at: X (3-D: [x, y]): their top above that place
     GAUGE_GRAIN_SLOPE,  // grains_slope: [x0, x1]: degrees by which it falls to the right, from x0 = from[0] to x1 = from[1]
     GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
+    GAUGE_GRAIN_PLACE,    // grain_place: K: of grain K (silt_gauge_def.index): columns NAME_x, NAME_y, NAME_z
+    GAUGE_GRAIN_VELOCITY, // grain_velocity: K
+    GAUGE_GRAIN_SPIN,     // grain_spin: K
+    GAUGE_GRAIN_FORCE,    // grain_force: K: of its contacts
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
 } silt_gauge_kind;
 typedef struct silt_gauge_def {

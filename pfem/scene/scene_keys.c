@@ -465,8 +465,10 @@ static const silt_key grains_rows[] = {
 TABLE(grains, "the grains block", silt_grains_def, -1);
 
 static const silt_key contact_rows[] = {
-    {"youngs_modulus", KEY_NUMBER, .unit = "Pa", RANGE(5e6, 1e9), AT(silt_contact_def, youngs_modulus),
+    {"youngs_modulus", KEY_NUMBER, .unit = "Pa", RANGE(5e6, 1e12), AT(silt_contact_def, youngs_modulus),
      .doc = "of grains and bodies; soft is fast"},
+    {"wall_modulus", KEY_NUMBER, .unit = "Pa", .fallback = "=contact.youngs_modulus", RANGE(5e6, 1e16), AT(silt_contact_def, wall_modulus),
+     .doc = "Young's modulus of the walls; a thousand times that of the grains is rigid"},
     {"poissons_ratio", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 0.5), AT(silt_contact_def, poissons_ratio),
      .doc = "of grains and bodies"},
     {"restitution", KEY_NUMBER, RANGE(0.05, 1), AT(silt_contact_def, restitution), .doc = "coefficient of restitution"},
@@ -526,6 +528,14 @@ static const silt_key gauge_rows[] = {
      .doc = "top of the heap at this x (3-D: [x, y])"},
     {"grains_slope", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_GRAIN_SLOPE, AT(silt_gauge_def, from),
      .doc = "angle in degrees by which the top of the heap falls to the right, by least squares between these two x"},
+    {"grain_place", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_PLACE, AT(silt_gauge_def, index),
+     .doc = "centre of this grain, those of the list from 1, then the regions'; columns NAME_x, NAME_y, NAME_z"},
+    {"grain_velocity", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_VELOCITY,
+     AT(silt_gauge_def, index), .doc = "of this grain, columns NAME_x, NAME_y, NAME_z"},
+    {"grain_spin", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_SPIN, AT(silt_gauge_def, index),
+     .doc = "angular velocity of this grain, rad/s, columns NAME_x, NAME_y, NAME_z"},
+    {"grain_force", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_FORCE, AT(silt_gauge_def, index),
+     .doc = "force of contacts on this grain, mean of the last step, N, columns NAME_x, NAME_y, NAME_z; per metre of width in 2-D"},
     {"force_on", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(0, INT32_MAX), .select = GAUGE_FORCE,
      AT(silt_gauge_def, index),
      .doc = "force of the water on this wall of the list, from 0; columns NAME_x, NAME_y, NAME_z, N"},
