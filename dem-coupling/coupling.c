@@ -501,6 +501,7 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
             c->force[3 * k + d] = g->force[d] * c->width * silt_coupling_burden(c, g);
     }
     silt_coupling_twist(c);
+    silt_coupling_shift(c);
     for (int i = 0; i < c->bodies->count; i++)
         for (int k = 0; k < 3; k++) {
             c->body_force[3 * i + k] = c->bodies->body[i].force[k] * c->width;
@@ -713,7 +714,8 @@ static void coupling_close(silt_coupling **coupling) {
     void *owned[] = {w->contact, w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
                      c->body,     c->body_force, c->body_torque, c->force, c->add,    c->torque,
-                     c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate};
+                     c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate,
+                     c->eddy,     c->shift,      c->walk};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);
@@ -777,6 +779,7 @@ const silt_coupling_type silt_coupling_dem = {
     .bodies = coupling_bodies,
     .prepare = coupling_prepare,
     .load = coupling_load,
+    .walk = silt_coupling_walk,
     .exchanged = coupling_exchanged,
     .outline = coupling_outline,
     .room = coupling_room,

@@ -250,6 +250,8 @@ typedef struct silt_grains_def {
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false
     bool rotational_drag; // torque on the spin, default false
+    bool random_walk;     // of suspended grains in the eddies, default false
+    double schmidt;       // 1, eddy viscosity over the grains' diffusivity
     int n_grain;
     silt_grain_def *grain; // owned; key `list`
     int n_fill;
