@@ -30,6 +30,16 @@ static void flow_fill(flow *f, double (*level)(const double *x)) {
     b->mesh.n_node = b->nodes.count;
     b->mesh.wet = silt_alloc((size_t)b->nodes.count + 1, sizeof *b->mesh.wet);
     f->taken = silt_alloc((size_t)b->nodes.count + 1, sizeof *f->taken);
+    // every node has one of the water's inside beside it, the last
+    const int n = b->nodes.count, inner = silt_nodes_add(&b->nodes, NODE_FLUID, -1, (double[2]){0, 0});
+    b->mesh.neighbour_start = silt_alloc((size_t)n + 2, sizeof(int));
+    b->mesh.neighbour = silt_alloc((size_t)n + 1, sizeof(int));
+    b->mesh.surface = silt_alloc((size_t)n + 1, 1);
+    for (int i = 0; i < n; i++) {
+        b->mesh.neighbour[i] = inner;
+        b->mesh.neighbour_start[i + 1] = i + 1;
+    }
+    b->nodes.count = n;
     for (int i = 0; i < b->nodes.count; i++) {
         const double deep = level(b->nodes.x + 2 * i) - b->nodes.x[2 * i + 1];
         b->mesh.wet[i] = deep > -1e-9;
