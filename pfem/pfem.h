@@ -375,6 +375,7 @@ typedef struct silt_grain_state {
     const double *mass;      // kg per m of width that the parcel stands for
     const int *contacts;     // number of contacts of the last substep
     const uint8_t *on_bed;   // 1 when one of them is with the bed
+    const double *contact;   // 3 per grain, N per m of width, of contacts, mean of the last step; may be NULL
     const double *net_force; // N per m of width, magnitude, mean of the last step (with gravity and water)
 } silt_grain_state;
 
@@ -416,6 +417,7 @@ typedef struct silt_ledger {
     int grain_count;
     double grain_mass, sediment_error;
     double grain_velocity[3];                     // m/s, mean by mass
+    double grain_kinetic, grain_potential;        // J/m, with the spin's; against the height 0
     double grain_water[3], grain_contact[3];      // N/m, force of the water and of contacts on all grains, mean of the last step
     double external_work, dissipation;            // J/m, cumulative
     double max_speed;                             // m/s, of the water's nodes

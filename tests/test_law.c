@@ -178,6 +178,50 @@ static void test_cover(void **state) {
     bench_close(&b);
 }
 
+// what parcels of diameter d at distance `apart` cover of a flat bed of 2 m, at x = 0.5 to 1.5 m, where they lie without end
+static void check_cover(double d, double apart, double share) {
+    bench b;
+    bench_open(&b, 0.05);
+    bench_box(&b, 0, 0, 2, 0.1);
+    bench_wall(&b, 4, (double[]){0, 1, 0, 0, 2, 0, 2, 1});
+    bench_create(&b);
+    enum { MOST = 200 };
+    double x[3 * MOST] = {0}, radius[MOST], cover[512];
+    uint8_t on_bed[MOST];
+    int n = 0;
+    for (double at = 0.2; at < 1.8; at += apart, n += 2)
+        for (int high = 0; high < 2; high++) {
+            // a second row that does not touch the bed covers nothing
+            x[3 * (n + high)] = at;
+            x[3 * (n + high) + 1] = 0.1 + (0.5 + high) * d;
+            radius[n + high] = 0.5 * d;
+            on_bed[n + high] = !high;
+        }
+    assert_in_range(n, 2, MOST);
+    const silt_grain_state grains = {.count = n, .x = x, .radius = radius, .on_bed = on_bed};
+    silt_bed_cover(&b.bed, &b.scene, &grains, cover);
+    double sum = 0;
+    for (int i = 0; i < b.bed.n_node; i++) {
+        assert_true(cover[i] >= 0 && cover[i] <= 1);
+        if (b.bed.exposed[i] && b.bed.x[i][0] > 0.5 && b.bed.x[i][0] < 1.5)
+            NEAR(cover[i], share, share < 1 ? 0.05 : 0.02);
+        if (b.bed.exposed[i] && (b.bed.x[i][0] < 0.09 || b.bed.x[i][0] > 1.91))
+            NEAR(cover[i], 0, 0);
+        sum += b.bed.exposed[i] ? cover[i] * (b.bed.x[i][0] > 0 && b.bed.x[i][0] < 2 ? 0.05 : 0.025) : 0;
+    }
+    // what they cover in all: as many diameters, but where they are dense
+    if (share < 0.9)
+        NEAR(sum, n / 2 * d, 1e-12);
+    bench_close(&b);
+}
+
+static void test_cover_parcels(void **state) {
+    (void)state;
+    check_cover(0.03, 0.06, 0.5);
+    check_cover(0.03, 0.03, 1);
+    check_cover(0.03, 0.04, 0.75);
+}
+
 // ---------------------------------------------------------------- in the long run
 
 // m/s by which a flat bed sinks in a uniform stream: the slope of its mass over time between a tenth and seven tenths gone. ragged:
@@ -250,7 +294,7 @@ static void test_sinking(void **state) {
 int main(void) {
     const struct CMUnitTest test[] = {
         cmocka_unit_test(test_shields), cmocka_unit_test(test_slope),    cmocka_unit_test(test_rate),    cmocka_unit_test(test_log_law),
-        cmocka_unit_test(test_gradient), cmocka_unit_test(test_cover), cmocka_unit_test(test_sinking),
+        cmocka_unit_test(test_gradient), cmocka_unit_test(test_cover), cmocka_unit_test(test_cover_parcels), cmocka_unit_test(test_sinking),
     };
     return cmocka_run_group_tests(test, NULL, NULL);
 }

@@ -272,7 +272,7 @@ static void test_gauges(void **state) {
     "volume_moved,volume_reconnected,volume_refined,volume_given,volume_owed,angular_momentum_x,"                      \
     "angular_momentum_y,angular_momentum_z,"
 #define GRAIN_FORCES                                                                                                   \
-    "grain_velocity_x,grain_velocity_y,grain_velocity_z,grain_water_x,grain_water_y,grain_water_z,grain_contact_x,"    \
+    "grain_velocity_x,grain_velocity_y,grain_velocity_z,grain_kinetic_energy,grain_potential_energy,grain_water_x,grain_water_y,grain_water_z,grain_contact_x,"    \
     "grain_contact_y,grain_contact_z,"
 
 static void test_history_columns(void **state) {

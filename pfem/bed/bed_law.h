@@ -33,6 +33,9 @@ double silt_bed_rate(const silt_scene *scene, double tau, double threshold, doub
  * @param cover  one per node, share of its surface that parcels lie on, which does not wear; NULL: none */
 void silt_bed_wear(silt_bed *bed, const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh,
                    const silt_locator *locator, const double *cover, double dt);
+/** Share of every node's surface that parcels lie on or roll over (bed_cover.c): a parcel that touches the bed covers its own width
+ * (in space: its section), shared among the exposed nodes around it. @param cover  out, n_node numbers, 0 to 1 */
+void silt_bed_cover(const silt_bed *bed, const silt_scene *scene, const silt_grain_state *grains, double *cover);
 /** Exposed nodes whose accumulator is full, fullest first: work >= W_c, or mass per area worn off >= mass per exposed area of the
  * patch. Ask once a step: what that step's releases expose comes in the next. @return how many (at most capacity) */
 int silt_bed_due(const silt_bed *bed, const silt_scene *scene, int capacity, int *due);

@@ -154,7 +154,7 @@ static void rows_make(silt_seep *seep, const silt_bed *bed) {
                 seep->factor.index[lower++] = seep->index[m];
     }
     start[n] = lower;
-    silt_factor_analyse(&seep->factor, FACTOR_DEFINITE, NULL);
+    silt_factor_analyse(&seep->factor);
     seep->revision = bed->revision;
 }
 

@@ -64,6 +64,8 @@ static const history_column history_ledger[] = {
     {"grain_velocity_x", PART_GRAINS, offsetof(silt_ledger, grain_velocity[0]), false},
     {"grain_velocity_y", PART_GRAINS, offsetof(silt_ledger, grain_velocity[1]), false},
     {"grain_velocity_z", PART_GRAINS, offsetof(silt_ledger, grain_velocity[2]), false},
+    {"grain_kinetic_energy", PART_GRAINS, offsetof(silt_ledger, grain_kinetic), false},
+    {"grain_potential_energy", PART_GRAINS, offsetof(silt_ledger, grain_potential), false},
     {"grain_water_x", PART_GRAINS, offsetof(silt_ledger, grain_water[0]), false},
     {"grain_water_y", PART_GRAINS, offsetof(silt_ledger, grain_water[1]), false},
     {"grain_water_z", PART_GRAINS, offsetof(silt_ledger, grain_water[2]), false},

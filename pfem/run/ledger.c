@@ -101,11 +101,16 @@ void silt_run_ledger(silt_run *run) {
     ledger->grain_count = 0;
     ledger->grain_mass = 0;
     memset(ledger->grain_velocity, 0, sizeof ledger->grain_velocity);
+    ledger->grain_kinetic = ledger->grain_potential = 0;
     if (run->coupling) {
         const silt_grain_state *grains = silt_coupling_dem.grains(run->coupling);
         double moving = 0;
         for (int k = 0; k < grains->count; k++) {
+            const double *x = grains->x + 3 * k, *v = grains->v + 3 * k, *spin = grains->omega + 3 * k;
             moving += grains->mass[k];
+            ledger->grain_kinetic += 0.5 * grains->mass[k] *
+                                     (silt_dot(3, v, v) + 0.4 * silt_square(grains->radius[k]) * silt_dot(3, spin, spin));
+            ledger->grain_potential -= grains->mass[k] * silt_dot(3, x, scene->gravity);
             for (int d = 0; d < 3; d++)
                 ledger->grain_velocity[d] += grains->mass[k] * grains->v[3 * k + d];
         }
@@ -152,11 +157,12 @@ void silt_run_balance(silt_run *run) {
         return;
     silt_exchanged exchanged;
     silt_coupling_dem.exchanged(run->coupling, &exchanged);
-    for (int d = 0; d < 2; d++) {
+    double open[3] = {0};
+    for (int d = 0; d < 3; d++) {
+        open[d] = fluid->from_grains[d] + exchanged.grains[d];
         ledger->grain_water[d] = exchanged.grains[d];
         ledger->grain_contact[d] = exchanged.contact[d];
     }
-    const double open = hypot(fluid->from_grains[0] + exchanged.grains[0], fluid->from_grains[1] + exchanged.grains[1]);
     if (exchanged.size > 0)
-        ledger->momentum_error = silt_max(ledger->momentum_error, open / exchanged.size);
+        ledger->momentum_error = silt_max(ledger->momentum_error, silt_length(3, open) / exchanged.size);
 }

@@ -241,8 +241,14 @@ static void bed_resolved(silt_run *run) {
 static void bed_step(silt_run *run) {
     const double dt = silt_max(run->dt - run->wear_ahead, 0);
     run->wear_ahead = silt_max(run->wear_ahead - run->dt, 0);
-    if (run->scene->fluid.on && dt > 0)
-        silt_bed_wear(&run->bed, run->scene, &run->nodes, &run->mesh, &run->locator, NULL, dt);
+    if (run->scene->fluid.on && dt > 0) {
+        const silt_grain_state *grains = run->coupling && run->scene->bed.cover ? silt_coupling_dem.grains(run->coupling) : NULL;
+        double *cover = grains && grains->count ? silt_alloc((size_t)run->bed.n_node + 1, sizeof *cover) : NULL;
+        if (cover)
+            silt_bed_cover(&run->bed, run->scene, grains, cover);
+        silt_bed_wear(&run->bed, run->scene, &run->nodes, &run->mesh, &run->locator, cover, dt);
+        free(cover);
+    }
     bed_resolved(run);
     silt_run_release(run);
 }

@@ -223,6 +223,7 @@ typedef struct silt_grain_def {
     double at[3], velocity[3];
     double diameter; // m
     double density;  // kg/m3
+    bool fixed;      // held where it is, default false
 } silt_grain_def;
 typedef enum { ARRANGE_RANDOM = 0, ARRANGE_LATTICE } silt_arrangement;
 /** a region full of grains at the start (fill.c) */
@@ -236,6 +237,7 @@ typedef struct silt_fill_def {
     int count;          // grains; 0: not given
     silt_arrangement arrangement;
     int seed;
+    bool fixed; // its grains are held where they are, default false
 } silt_fill_def;
 typedef struct silt_grains_def {
     bool on;              // true when the block is there; bodies alone need contact properties too: see contact
@@ -248,7 +250,6 @@ typedef struct silt_grains_def {
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false
     bool rotational_drag; // torque on the spin, default false
-    bool fixed;           // the grains of the start are held where they are, default false
     int n_grain;
     silt_grain_def *grain; // owned; key `list`
     int n_fill;
@@ -260,7 +261,8 @@ typedef struct silt_grains_def {
 /** contact properties of grains, bodies and walls; block `contact`, required with grains, bed or bodies */
 typedef struct silt_contact_def {
     bool on;
-    double youngs_modulus;   // Pa, 5e6 to 1e9
+    double youngs_modulus;   // Pa, 5e6 to 1e12
+    double wall_modulus;     // Pa, Young's modulus of the walls; default youngs_modulus
     double poissons_ratio;
     double restitution;      // 0.05 to 1
     double friction;
@@ -303,6 +305,14 @@ typedef enum {
     GAUGE_FORCE,      // force_on: I: force of the water on wall I of the scene: columns NAME_x, NAME_y, NAME_z
     GAUGE_ANGULAR,    // angular_momentum_about: [x, y]; in 3-D columns NAME_x, NAME_y, NAME_z
     GAUGE_CENTROID,   // centroid_of: water: columns NAME_x, NAME_y, NAME_z
+    GAUGE_GRAIN_FRONT,  // grains_front: x | -x: the foremost x of the grains that hang together
+    GAUGE_GRAIN_HEIGHT, // grains_height_at: X (3-D: [x, y]): their top above that place
+    GAUGE_GRAIN_SLOPE,  // grains_slope: [x0, x1]: degrees by which it falls to the right, from x0 = from[0] to x1 = from[1]
+    GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
+    GAUGE_GRAIN_PLACE,    // grain_place: K: of grain K (silt_gauge_def.index): columns NAME_x, NAME_y, NAME_z
+    GAUGE_GRAIN_VELOCITY, // grain_velocity: K
+    GAUGE_GRAIN_SPIN,     // grain_spin: K
+    GAUGE_GRAIN_FORCE,    // grain_force: K: of its contacts
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
 } silt_gauge_kind;
 typedef struct silt_gauge_def {
@@ -405,14 +415,15 @@ int silt_series_column(const silt_series *series, const char *name); /**< column
 /** What silt_series_at needs: two columns or more, finite numbers, column 0 strictly rising. The error names file and line. */
 silt_status silt_series_rising(const silt_series *series, silt_error *err);
 
+/** m, k_s of the bed */
+static inline double silt_bed_roughness(const silt_scene *s) {
+    return s->bed.roughness > 0 ? s->bed.roughness : 2.5 * s->grains.diameter;
+}
+
 /** all grains that are there at the start: the list's, then the regions' */
 static inline int silt_scene_grains(const silt_scene *s) { return s->grains.n_grain + s->grains.n_filled; }
 static inline const silt_grain_def *silt_scene_grain(const silt_scene *s, int i) {
     return i < s->grains.n_grain ? &s->grains.grain[i] : &s->grains.filled[i - s->grains.n_grain];
-}
-/** m, k_s of the bed */
-static inline double silt_bed_roughness(const silt_scene *s) {
-    return s->bed.roughness > 0 ? s->bed.roughness : 2.5 * s->grains.diameter;
 }
 
 /** what a scene needs */
