@@ -97,7 +97,7 @@ static double dot(int n, const double *a, const double *b) {
 }
 
 // Saad, SIAM J. Sci. Comput. 14, 1993, without restarts: B is not symmetric, since what passes the bed reaches the row of nodes over it,
-// and what comes before it (multigrid) is not the same every time. Two to four directions for sand.
+// and what comes before it (multigrid) is not the same every time. 1 to 4 directions up to K = 1 cm/s.
 silt_status silt_seepage_solve(silt_fluid *f, const silt_step *s, const double *right, double tolerance, double *x, silt_error *err) {
     enum { MOST = SEEPAGE_MOST };
     const int n = f->n_node;
