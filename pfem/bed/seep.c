@@ -422,7 +422,7 @@ void silt_seep_apply(silt_seep *seep, const double *x, double *out) {
 // ---------------------------------------------------------------- results
 
 // Darcy's velocity of the cells, and per node the upward force of the seepage on the grains over their weight under water
-static void results_make(silt_seep *seep, const silt_bed *bed, const silt_scene *scene) {
+void silt_seep_results(silt_seep *seep, const silt_bed *bed, const silt_scene *scene) {
     const int D = seep_dim(bed);
     const double rho = scene->fluid.density, size = silt_length(3, scene->gravity);
     double *weight = seep->right;
@@ -462,7 +462,7 @@ void silt_seep_accept(silt_seep *seep, silt_bed *bed, const silt_scene *scene, c
         if (seep->kind[k] == SEEP_FACE && seep->foot[k] < 0)
             seep->lost -= into;
     }
-    results_make(seep, bed, scene);
+    silt_seep_results(seep, bed, scene);
 }
 
 bool silt_seep_pressure_at(const silt_bed *bed, const double *x, double *pressure) {

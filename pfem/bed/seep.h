@@ -58,6 +58,8 @@ void silt_seep_take(silt_seep *seep, const double *p, double *taken);
 void silt_seep_apply(silt_seep *seep, const double *x, double *out);
 /** The water's step is solved: the pressure in the bed, discharge, gradients. */
 void silt_seep_accept(silt_seep *seep, silt_bed *bed, const silt_scene *scene, const double *p);
+/** Discharge and gradients for the bed as it is now, after silt_seep_fit */
+void silt_seep_results(silt_seep *seep, const silt_bed *bed, const silt_scene *scene);
 /** pressure in the bed at a place; false outside of it */
 bool silt_seep_pressure_at(const silt_bed *bed, const double *x, double *pressure);
 silt_status silt_seep_save(const silt_seep *seep, silt_store *store, silt_error *err);
