@@ -737,6 +737,8 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         f->mobile[i] = 1;
         f->withheld[i] = f->residual[i] = 0;
     }
+    if (f->seep)
+        silt_seepage_begin(f, s);
     resist_begin(f, s);
     if (f->shift)
         memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);

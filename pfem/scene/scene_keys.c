@@ -515,7 +515,7 @@ static const silt_key gauge_rows[] = {
     {"velocity_at", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_VELOCITY, AT(silt_gauge_def, from),
      .doc = "velocity there, columns NAME_x, NAME_y, NAME_z"},
     {"discharge", KEY_SEGMENT, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_DISCHARGE,
-     AT(silt_gauge_def, from), .doc = "flow through the segment from its left to its right, m2/s"},
+     AT(silt_gauge_def, from), .doc = "flow through the segment from its left to its right, with seepage also that through the bed, m2/s"},
     {"bed_level_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_BED_LEVEL,
      AT(silt_gauge_def, from), .doc = "height of the bed at this x (3-D: [x, y])"},
     {"scour_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_SCOUR,
