@@ -528,7 +528,7 @@ static bool coupling_leaves(const silt_fluid_def *fluid, const double a[2], cons
 }
 
 static void coupling_leave(silt_coupling *c, coupling_grain *g) {
-    c->left_mass += g->mass;
+    silt_sum(&c->left_mass, &c->left_rest, g->mass);
     c->left_count++;
     coupling_take(c, g);
 }
