@@ -401,10 +401,10 @@ static void test_deposited(void **state) {
     const double loose = 2650 * 0.6 * b.bed.area[deposit.cell[0]] - b.bed.mass[deposit.cell[0]];
     assert_true(loose > 0);
     silt_deposit more;
-    assert_int_equal(silt_bed_densify(&b.bed, &b.scene, (double[]){0.275, 0.15, 0}, 0.02, 1.01 * loose, &more), DEPOSIT_REFUSED);
-    assert_int_equal(silt_bed_densify(&b.bed, &b.scene, (double[]){0.275, 0.15, 0}, 0.02, loose, &more), DEPOSIT_DENSER);
+    assert_int_equal(silt_bed_densify(&b.bed, &b.scene, (double[]){0.275, 0.15, 0}, 0.04, 0.4, 1.01 * loose, &more), DEPOSIT_REFUSED);
+    assert_int_equal(silt_bed_densify(&b.bed, &b.scene, (double[]){0.275, 0.15, 0}, 0.04, 0.4, loose, &more), DEPOSIT_DENSER);
     NEAR(more.pore_water, -loose / 2650 * 1000, 1e-12);
-    assert_int_equal(silt_bed_densify(&b.bed, &b.scene, (double[]){0.275, 0.15, 0}, 0.02, 0.01 * loose, &more), DEPOSIT_REFUSED);
+    assert_int_equal(silt_bed_densify(&b.bed, &b.scene, (double[]){0.275, 0.15, 0}, 0.04, 0.4, 0.01 * loose, &more), DEPOSIT_REFUSED);
     NEAR(b.bed.solid_mass, whole + mass + loose, 1e-12 * whole);
     // the stress that keeps it from being bed is that of the nearest node
     b.bed.shear[deposit.node] = 0.7;

@@ -404,36 +404,55 @@ double silt_bed_shear_at(const silt_bed *bed, const double *x) {
     return shear;
 }
 
-silt_deposit_kind silt_bed_densify(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass, silt_deposit *deposit) {
-    *deposit = (silt_deposit){.kind = DEPOSIT_REFUSED, .node = -1};
+typedef struct bed_room {
+    int cell;
+    double way, room; // m to its centre, kg/m that it still takes
+} bed_room;
+
+static int room_compare(const void *a, const void *b) {
+    const bed_room *p = a, *q = b;
+    return p->way != q->way ? (p->way > q->way) - (p->way < q->way) : (p->cell > q->cell) - (p->cell < q->cell);
+}
+
+// cells with pores to spare within reach of x, the nearest first; @return kg/m that they take
+static double room_list(const silt_bed *bed, const silt_scene *scene, const double *x, double reach, double porosity, int *n, bed_room *list) {
     const int dim = bed->dim == 3 ? 3 : 2;
-    const double full = scene->bed.density * (1 - scene->bed.porosity) * (1 + 1e-9);
-    // the cell whose centre is nearest, of those with a node of the surface and room for all of it
-    double nearest = silt_square(1.5 * r + bed_size(scene));
-    int best = -1;
+    double sum = 0;
+    *n = 0;
     for (int c = 0; c < bed->n_cell; c++) {
-        if (bed->mass[c] + mass > full * bed->area[c])
-            continue;
         double centre[3] = {0}, way = 0;
-        bool bare = false;
-        for (int a = 0; a <= dim; a++) {
-            bare |= bed->exposed[bed->cell[c][a]] != 0;
+        for (int a = 0; a <= dim; a++)
             for (int d = 0; d < dim; d++)
                 centre[d] += bed->x[bed->cell[c][a]][d] / (dim + 1);
-        }
         for (int d = 0; d < dim; d++)
             way += silt_square(centre[d] - x[d]);
-        if (bare && way < nearest) {
-            nearest = way;
-            best = c;
-        }
+        const double room = scene->bed.density * (1 - porosity) * bed->area[c] - bed->mass[c];
+        if (way > reach * reach || room <= 1e-9 * bed->mass[c])
+            continue;
+        list[(*n)++] = (bed_room){c, sqrt(way), room};
+        sum += room;
     }
-    if (best < 0 || !(mass > 0))
-        return deposit->kind;
-    bed->mass[best] += mass;
-    silt_bed_refresh(bed);
-    deposit->kind = DEPOSIT_DENSER;
-    deposit->pore_water = -scene->bed.saturation * mass / scene->bed.density * scene->fluid.density;
-    silt_sum(&bed->pore_water, &bed->pore_rest, -deposit->pore_water);
+    qsort(list, (size_t)*n, sizeof *list, room_compare);
+    return sum;
+}
+
+silt_deposit_kind silt_bed_densify(silt_bed *bed, const silt_scene *scene, const double *x, double reach, double porosity, double mass,
+                                   silt_deposit *deposit) {
+    *deposit = (silt_deposit){.kind = DEPOSIT_REFUSED, .node = -1};
+    bed_room *list = silt_alloc((size_t)bed->n_cell + 1, sizeof *list);
+    int n;
+    if (mass > 0 && room_list(bed, scene, x, reach, porosity, &n, list) >= mass) {
+        double left = mass;
+        for (int k = 0; k < n && left > 0; k++) {
+            const double part = silt_min(left, list[k].room);
+            bed->mass[list[k].cell] += part;
+            left -= part;
+        }
+        silt_bed_refresh(bed);
+        deposit->kind = DEPOSIT_DENSER;
+        deposit->pore_water = -scene->bed.saturation * mass / scene->bed.density * scene->fluid.density;
+        silt_sum(&bed->pore_water, &bed->pore_rest, -deposit->pore_water);
+    }
+    free(list);
     return deposit->kind;
 }

@@ -50,9 +50,10 @@ int silt_bed_due(const silt_bed *bed, const silt_scene *scene, int capacity, int
 int silt_bed_steep(const silt_bed *bed, const silt_scene *scene, int capacity, int *node);
 /** Pa, shear stress of the last step on the exposed node nearest to x (dim numbers); 0 without any */
 double silt_bed_shear_at(const silt_bed *bed, const double *x);
-/** Puts a parcel's solid mass into the nearest cell at the surface, within a cell of the parcel, that stays no denser than the bed was
- * at the start: all of it or nothing. @return in deposit->kind: DEPOSIT_DENSER or DEPOSIT_REFUSED */
-silt_deposit_kind silt_bed_densify(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass, silt_deposit *deposit);
+/** Puts a parcel's solid mass into the pores of cells whose centres are within reach of x, the nearest first, down to a porosity: all of
+ * it or nothing. @return in deposit->kind: DEPOSIT_DENSER or DEPOSIT_REFUSED */
+silt_deposit_kind silt_bed_densify(silt_bed *bed, const silt_scene *scene, const double *x, double reach, double porosity, double mass,
+                                   silt_deposit *deposit);
 /** The nodes around a patch that is about to leave, and what its node has worn off beyond it */
 typedef struct silt_bed_heirs {
     int count, node_capacity, length_capacity;

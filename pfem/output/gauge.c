@@ -59,6 +59,10 @@ int silt_gauge_columns(const silt_scene *scene, int i) {
     case GAUGE_VELOCITY:
     case GAUGE_FORCE:
     case GAUGE_CENTROID:
+    case GAUGE_GRAIN_PLACE:
+    case GAUGE_GRAIN_VELOCITY:
+    case GAUGE_GRAIN_SPIN:
+    case GAUGE_GRAIN_FORCE:
         return 3;
     case GAUGE_GRAINS:
         return 4;
@@ -528,7 +532,8 @@ static void gauge_water(silt_gauges *g, const silt_view *view, const silt_gauge_
             value[0] = 0;
             for (int k = 0; k < 4; k++)
                 value[0] += weight[k] * view->nodes->p[node[k]];
-        }
+        } else if (view->bed)
+            silt_seep_pressure_at(view->bed, def->from, value);
         break;
     case GAUGE_VELOCITY:
         if (gauge_point(view, def->from, node, weight)) {
@@ -568,7 +573,9 @@ void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value)
             double level = view->bed ? silt_bed_level(view->bed, def->from) : -HUGE_VAL;
             if (level > -HUGE_VAL)
                 value[0] = def->kind == GAUGE_SCOUR ? gauges->start[i] - level : level;
-        } else if (def->kind == GAUGE_GRAIN_FRONT || def->kind == GAUGE_GRAIN_HEIGHT || def->kind == GAUGE_GRAIN_SLOPE) {
+        } else if (def->kind >= GAUGE_GRAIN_PLACE && def->kind <= GAUGE_GRAIN_FORCE) {
+            silt_grain_gauge(view, def, value);
+        } else if (def->kind >= GAUGE_GRAIN_FRONT && def->kind <= GAUGE_GRAIN_SLOPE) {
             if (!heap)
                 silt_heap_find(&gauges->heap, view);
             heap = true;

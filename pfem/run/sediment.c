@@ -6,10 +6,13 @@
 #define DEPOSIT_FORCE 0.1   // net force, of the submerged weight
 #define DEPOSIT_TIME 10     // times sqrt(d/g), at rest for so long
 #define PARCELS_MOST 256    // of one patch
+#define DEPOSIT_PATIENCE 5  // times that: what finds no sound place goes into pores
+#define DEPOSIT_PORES 0.5   // of the bed's porosity: what pores are filled to at most
 #define DEPOSIT_SHIELDS 0.8 // of the stress that moves grains
 #define RELEASE_MOST 64     // patches in one step
 #define RELEASE_LONG 4      // radii: a parcel that had to look farther goes up through the heap on it
 #define RELEASE_FAR 12      // radii, the farthest that it looks
+#define RELEASE_LIFTS 0.5   // upward part of the normal above which seepage can lift grains off
 #define RELEASE_HANGS -0.3  // upward part of the normal out of the bed below which sand does not hold
 
 static double gravity_of(const silt_scene *scene) {
@@ -117,6 +120,26 @@ static void release_steep(silt_run *run) {
             release_node(run, steep[k]);
 }
 
+// Seepage that outweighs the grains lifts them off: nodes on a surface that looks up, where its force is their weight under water
+static void release_lifted(silt_run *run) {
+    const silt_bed *bed = &run->bed;
+    const double *g = run->scene->gravity, size = gravity_of(run->scene);
+    if (!bed->seepage || !run->scene->bed.fluidise || !(size > 0))
+        return;
+    int lifted[RELEASE_MOST], n = 0;
+    for (int k = 0; k < run->seep.n_node && n < RELEASE_MOST; k++) {
+        double normal[3] = {0};
+        if (!bed->alive[k] || !bed->exposed[k] || bed->seepage[k] < 1)
+            continue;
+        silt_bed_normal(bed, k, normal);
+        if (-silt_dot(3, normal, g) > RELEASE_LIFTS * size)
+            lifted[n++] = k;
+    }
+    for (int k = 0; k < n; k++)
+        if (bed->alive[lifted[k]] && bed->exposed[lifted[k]])
+            release_node(run, lifted[k]);
+}
+
 void silt_run_release(silt_run *run) {
     if (!run->scene->bed.on)
         return;
@@ -128,6 +151,7 @@ void silt_run_release(silt_run *run) {
             continue;
         release_node(run, due[k]);
     }
+    release_lifted(run);
     if (run->bed.revision != run->bed_revision) {
         const int loose = silt_bed_loose(&run->bed, run->scene, RELEASE_MOST, due);
         for (int k = 0; k < loose; k++)
@@ -216,6 +240,24 @@ static bool water_calm(const silt_run *run, const double *x) {
     return !run->scene->fluid.on || silt_bed_shear_at(&run->bed, x) < DEPOSIT_SHIELDS * silt_bed_motion(run->scene);
 }
 
+// A parcel at rest becomes bed: in looser cells where the scene says so, as new cells, and where these find no sound place for long, or
+// it lies under them, in the pores of the cells around it. rested: in sqrt(d/g)
+static bool deposit_parcel(silt_run *run, const double *x, double r, double mass, double rested, silt_deposit *deposit) {
+    const silt_scene *scene = run->scene;
+    const double size = scene->bed.size, near = r + size, far = r + 3 * size, loose = scene->bed.porosity;
+    const bool buried = silt_bed_contains(&run->bed, x);
+    if (!buried && !water_calm(run, x))
+        return false;
+    if (scene->bed.densify && silt_bed_densify(&run->bed, scene, x, near, loose, mass, deposit) != DEPOSIT_REFUSED)
+        return true;
+    if (!buried && silt_bed_deposit(&run->bed, scene, x, r, mass, deposit) != DEPOSIT_REFUSED)
+        return true;
+    if (!buried && rested < DEPOSIT_PATIENCE * DEPOSIT_TIME)
+        return false;
+    return silt_bed_densify(&run->bed, scene, x, far, loose, mass, deposit) != DEPOSIT_REFUSED ||
+           silt_bed_densify(&run->bed, scene, x, far, DEPOSIT_PORES * loose, mass, deposit) != DEPOSIT_REFUSED;
+}
+
 // new bed cells take their place from the water at the next rebuild
 static void remember_grown(silt_run *run, const silt_deposit *deposit) {
     for (int e = 0; e < deposit->n_cell; e++)
@@ -239,14 +281,13 @@ silt_status silt_run_deposit(silt_run *run, silt_error *err) {
         const double had = old < run->n_rest && run->rest[old].id == grains->id[k] ? run->rest[old].time : 0;
         if (!grain_slow(run, grains, k))
             continue;
-        const bool rests = grain_rests(run, grains, k);
+        // what new cells have buried is bed
+        const bool rests = grain_rests(run, grains, k) || silt_bed_contains(&run->bed, grains->x + 3 * k);
         const double now = had + (rests ? run->dt : 0);
         if (rests && now > DEPOSIT_TIME * sqrt(2 * grains->radius[k] / silt_max(g, 1e-12))) {
             silt_deposit deposit = {0};
             const double *x = grains->x + 3 * k, r = grains->radius[k], mass = grains->mass[k];
-            if (water_calm(run, x) &&
-                ((scene->bed.densify && silt_bed_densify(&run->bed, scene, x, r, mass, &deposit) != DEPOSIT_REFUSED) ||
-                 silt_bed_deposit(&run->bed, scene, x, r, mass, &deposit) != DEPOSIT_REFUSED)) {
+            if (deposit_parcel(run, x, r, mass, now * sqrt(g / (2 * r)), &deposit)) {
                 silt_coupling_dem.deposit(run->coupling, k);
                 silt_sum(&run->ledger.deposited_mass, &run->ledger.deposited_rest, mass);
                 remember_grown(run, &deposit);

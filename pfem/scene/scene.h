@@ -172,6 +172,7 @@ typedef struct silt_fluid_def {
 
 typedef enum { BED_FRICTIONAL_WORK = 1, BED_DISSIPATION, BED_POWER, BED_EXCESS_SHEAR, BED_SHIELDS } silt_bed_law;
 typedef enum { SHEAR_DEFAULT = 0, SHEAR_PAPER, SHEAR_GRADIENT, SHEAR_LOG_LAW } silt_bed_shear;
+typedef enum { SEEPAGE_NONE = 0, SEEPAGE_DARCY, SEEPAGE_KOZENY_CARMAN } silt_seepage;
 typedef struct silt_bed_def {
     bool on;
     double density;   // kg/m3 of the grains' solid, required
@@ -192,6 +193,9 @@ typedef struct silt_bed_def {
     int densify;       // key deposit: densify: resting grains first fill what is looser than the bed; default grow
     double deposit_work; // J/m3, W_c of what was deposited; 0: work
     double saturation; // share of the pores that holds water, default 1
+    silt_seepage seepage; // seepage: none | darcy | kozeny-carman
+    double permeability;  // m2, with seepage: darcy
+    bool fluidise;     // seepage that outweighs the grains lifts them off the surface, default true
     bool deposition;   // default true
     silt_condition condition; // of water on the bed, default no-slip
     int n_region;
@@ -221,6 +225,7 @@ typedef struct silt_grain_def {
     double at[3], velocity[3];
     double diameter; // m
     double density;  // kg/m3
+    bool fixed;      // held where it is, default false
 } silt_grain_def;
 typedef enum { ARRANGE_RANDOM = 0, ARRANGE_LATTICE } silt_arrangement;
 /** a region full of grains at the start (fill.c) */
@@ -234,6 +239,7 @@ typedef struct silt_fill_def {
     int count;          // grains; 0: not given
     silt_arrangement arrangement;
     int seed;
+    bool fixed; // its grains are held where they are, default false
 } silt_fill_def;
 typedef struct silt_grains_def {
     bool on;              // true when the block is there; bodies alone need contact properties too: see contact
@@ -248,7 +254,6 @@ typedef struct silt_grains_def {
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false
     bool rotational_drag; // torque on the spin, default false
-    bool fixed;           // the grains of the start are held where they are, default false
     int n_grain;
     silt_grain_def *grain; // owned; key `list`
     int n_fill;
@@ -260,7 +265,8 @@ typedef struct silt_grains_def {
 /** contact properties of grains, bodies and walls; block `contact`, required with grains, bed or bodies */
 typedef struct silt_contact_def {
     bool on;
-    double youngs_modulus;   // Pa, 5e6 to 1e9
+    double youngs_modulus;   // Pa, 5e6 to 1e12
+    double wall_modulus;     // Pa, Young's modulus of the walls; default youngs_modulus
     double poissons_ratio;
     double restitution;      // 0.05 to 1
     double friction;
@@ -307,6 +313,10 @@ typedef enum {
     GAUGE_GRAIN_HEIGHT, // grains_height_at: X (3-D: [x, y]): their top above that place
     GAUGE_GRAIN_SLOPE,  // grains_slope: [x0, x1]: degrees by which it falls to the right, from x0 = from[0] to x1 = from[1]
     GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
+    GAUGE_GRAIN_PLACE,    // grain_place: K: of grain K (silt_gauge_def.index): columns NAME_x, NAME_y, NAME_z
+    GAUGE_GRAIN_VELOCITY, // grain_velocity: K
+    GAUGE_GRAIN_SPIN,     // grain_spin: K
+    GAUGE_GRAIN_FORCE,    // grain_force: K: of its contacts
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
 } silt_gauge_kind;
 typedef struct silt_gauge_def {

@@ -39,6 +39,8 @@ static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, 
 static const silt_word shear_words[] = {{"default", SHEAR_DEFAULT}, {"paper", SHEAR_PAPER}, {"gradient", SHEAR_GRADIENT},
                                         {"log-law", SHEAR_LOG_LAW}, {0}};
 static const silt_word deposit_words[] = {{"grow", 0}, {"densify", 1}, {0}};
+static const silt_word seepage_words[] = {
+    {"none", SEEPAGE_NONE}, {"darcy", SEEPAGE_DARCY}, {"kozeny-carman", SEEPAGE_KOZENY_CARMAN}, {0}};
 static const silt_word drag_words[] = {
     {"none", DRAG_NONE},       {"stokes", DRAG_STOKES},         {"schiller-naumann", DRAG_SCHILLER_NAUMANN}, {"abraham", DRAG_ABRAHAM},
     {"di-felice", DRAG_DI_FELICE}, {"ergun", DRAG_ERGUN},       {"wen-yu", DRAG_WEN_YU},
@@ -388,6 +390,12 @@ static const silt_key bed_rows[] = {
      .doc = "the part of the bed that parcels lie on does not wear"},
     {"saturation", KEY_NUMBER, .fallback = "1", RANGE(0, 1), AT(silt_bed_def, saturation),
      .doc = "share of the pores that holds water"},
+    {"seepage", KEY_WORD, .fallback = "none", .words = seepage_words, AT(silt_bed_def, seepage),
+     .doc = "water in the bed's pores: none, by `permeability`, or by grains.diameter and the pores of each cell, d^2 n^3/(180 (1 - n)^2)"},
+    {"permeability", KEY_NUMBER, .unit = "m2", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, permeability),
+     .doc = "for seepage: darcy; the hydraulic conductivity K in m/s is this times density g/viscosity"},
+    {"fluidise", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, fluidise),
+     .doc = "seepage that outweighs the grains on the surface lifts them off"},
     {"deposition", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, deposition),
      .doc = "resting grains become bed again"},
     {"deposit", KEY_WORD, .fallback = "grow", .words = deposit_words, AT(silt_bed_def, densify),
@@ -407,6 +415,7 @@ static const silt_key grain_rows[] = {
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_grain_def, velocity), .doc = "at the start"},
     {"diameter", KEY_NUMBER, .unit = "m", POSITIVE, AT(silt_grain_def, diameter), .doc = "of this grain"},
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_grain_def, density), .doc = "of its solid"},
+    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_grain_def, fixed), .doc = "it is held where it is, at rest; others touch it"},
     {0}};
 TABLE(grain, "a grain", silt_grain_def, -1);
 
@@ -429,6 +438,7 @@ static const silt_key fill_rows[] = {
             "from below; denser packings come by letting grains settle"},
     {"seed", KEY_INTEGER, .fallback = "1", RANGE(0, INT32_MAX), AT(silt_fill_def, seed),
      .doc = "of the random places: the same places for the same seed"},
+    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_fill_def, fixed), .doc = "its grains are held where they are, at rest: a packed bed"},
     {0}};
 TABLE(fill, "a region of grains", silt_fill_def, offsetof(silt_fill_def, region.kind));
 
@@ -443,8 +453,8 @@ static const silt_key grains_rows[] = {
             "of the parcels, drawn by fluid.seed and node"},
     {"diameter", KEY_NUMBER, .unit = "m", .fallback = "=grains.parcel", NOT_NEGATIVE, AT(silt_grains_def, diameter),
      .doc = "of the grains that a parcel stands for, for the drag"},
-    {"width", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, width),
-     .doc = "accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel; without a bed 0.91 d with regions (n = 0.4), else 5 d"},
+    {"width", KEY_NUMBER, .unit = "m", .fallback = "0", .flags = KEY_PLANE, NOT_NEGATIVE, AT(silt_grains_def, width),
+     .doc = "accounting width; 0: (2/3)(0.82) d/(1 - n) of the parcel; without a bed 0.91 d with regions (n = 0.4), else 5 d"},
     {"kernel", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, kernel),
      .doc = "width of the porosity kernel; 0: the larger of 3 d and 2 h"},
     {"added_mass", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, added_mass),
@@ -454,8 +464,6 @@ static const silt_key grains_rows[] = {
      .doc = "force of the water's viscous stress on the grain's volume"},
     {"rotational_drag", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, rotational_drag),
      .doc = "torque of the water on grains that spin otherwise than it does"},
-    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, fixed),
-     .doc = "grains that are there from the start stay where they are: a packed bed"},
     {"list", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &grain_table, MANY(silt_grains_def, n_grain, grain),
      .doc = "grains that are there from the start"},
     {"regions", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &fill_table, MANY(silt_grains_def, n_fill, fill),
@@ -464,8 +472,10 @@ static const silt_key grains_rows[] = {
 TABLE(grains, "the grains block", silt_grains_def, -1);
 
 static const silt_key contact_rows[] = {
-    {"youngs_modulus", KEY_NUMBER, .unit = "Pa", RANGE(5e6, 1e9), AT(silt_contact_def, youngs_modulus),
+    {"youngs_modulus", KEY_NUMBER, .unit = "Pa", RANGE(5e6, 1e12), AT(silt_contact_def, youngs_modulus),
      .doc = "of grains and bodies; soft is fast"},
+    {"wall_modulus", KEY_NUMBER, .unit = "Pa", .fallback = "=contact.youngs_modulus", RANGE(5e6, 1e16), AT(silt_contact_def, wall_modulus),
+     .doc = "Young's modulus of the walls; a thousand times that of the grains is rigid"},
     {"poissons_ratio", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 0.5), AT(silt_contact_def, poissons_ratio),
      .doc = "of grains and bodies"},
     {"restitution", KEY_NUMBER, RANGE(0.05, 1), AT(silt_contact_def, restitution), .doc = "coefficient of restitution"},
@@ -525,6 +535,14 @@ static const silt_key gauge_rows[] = {
      .doc = "top of the heap at this x (3-D: [x, y])"},
     {"grains_slope", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_GRAIN_SLOPE, AT(silt_gauge_def, from),
      .doc = "angle in degrees by which the top of the heap falls to the right, by least squares between these two x"},
+    {"grain_place", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_PLACE, AT(silt_gauge_def, index),
+     .doc = "centre of this grain, those of the list from 1, then the regions'; columns NAME_x, NAME_y, NAME_z"},
+    {"grain_velocity", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_VELOCITY,
+     AT(silt_gauge_def, index), .doc = "of this grain, columns NAME_x, NAME_y, NAME_z"},
+    {"grain_spin", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_SPIN, AT(silt_gauge_def, index),
+     .doc = "angular velocity of this grain, rad/s, columns NAME_x, NAME_y, NAME_z"},
+    {"grain_force", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_FORCE, AT(silt_gauge_def, index),
+     .doc = "force of contacts on this grain, mean of the last step, N, columns NAME_x, NAME_y, NAME_z; per metre of width in 2-D"},
     {"force_on", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(0, INT32_MAX), .select = GAUGE_FORCE,
      AT(silt_gauge_def, index),
      .doc = "force of the water on this wall of the list, from 0; columns NAME_x, NAME_y, NAME_z, N"},
@@ -613,9 +631,9 @@ static const silt_key scene_rows[] = {
      .doc = "what holds it"},
     {"bed", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &bed_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, bed.on), AT(silt_scene, bed), .doc = "ground that the water can erode"},
-    {"grains", KEY_BLOCK, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &grains_table, .presence = PRESENT_FLAG,
+    {"grains", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &grains_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, grains.on), AT(silt_scene, grains), .doc = "loose grains; needed with a bed"},
-    {"contact", KEY_BLOCK, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &contact_table, .presence = PRESENT_FLAG,
+    {"contact", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &contact_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, contact.on), AT(silt_scene, contact),
      .doc = "how solids touch; needed with a bed, grains or bodies"},
     {"bodies", KEY_LIST, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &body_table, MANY(silt_scene, n_body, body),
