@@ -519,7 +519,7 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
 }
 
 static void coupling_leave(silt_coupling *c, coupling_grain *g) {
-    c->left_mass += g->mass;
+    silt_sum(&c->left_mass, &c->left_rest, g->mass);
     c->left_count++;
     coupling_take(c, g);
 }
