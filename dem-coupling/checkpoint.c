@@ -1,7 +1,7 @@
 // checkpoint.c: what the coupling knows, as named arrays in the store
 #include "state.h"
 
-enum { GRAIN_DOUBLES = 21, FROZEN_DOUBLES = 7, BODY_DOUBLES = 22 };
+enum { GRAIN_DOUBLES = 23, FROZEN_DOUBLES = 7, BODY_DOUBLES = 22 };
 
 // one row of numbers per grain, sphere or body, filled or read in one place
 static void checkpoint_copy(bool out, double **row, double *value, int n) {
@@ -16,8 +16,8 @@ static void checkpoint_grain_row(bool out, double *row, coupling_grain *g) {
     double *one[] = {&g->radius, &g->mass, &g->solid, &g->diameter, &g->number, &g->net};
     for (int k = 0; k < 6; k++)
         checkpoint_copy(out, &row, one[k], 1);
-    checkpoint_copy(out, &row, g->force, 2);
-    checkpoint_copy(out, &row, g->contact, 2);
+    checkpoint_copy(out, &row, g->force, 3);
+    checkpoint_copy(out, &row, g->contact, 3);
     double last[2] = {g->contacts, g->on_bed};
     checkpoint_copy(out, &row, last, 2);
     g->contacts = (int)last[0];

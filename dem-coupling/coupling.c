@@ -98,7 +98,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
 
     // physics: with the sphere's own diameter as width a random pack is too loose
     double diameter = silt_max(listed, 2.0 * c->parcel);
-    c->width = grains->width;
+    c->width = c->dim == 3 ? 1.0 : grains->width;
     if (!(c->width > 0.0)) {
         if (c->parcel > 0.0)
             c->width = 2.0 / 3.0 * 0.82 * 2.0 * c->parcel / (1.0 - scene->bed.porosity);
@@ -134,20 +134,25 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     c->exchange.density = scene->fluid.density;
     c->exchange.viscosity = scene->fluid.viscosity;
     c->exchange.refresh = true;
-    c->exchange.force.def = (silt_force_def){grains->added_mass, scene->fluid.theta, grains->viscous_force,
-                                             grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
-    for (int k = 0; k < 2; k++)
-        c->exchange.gravity[k] = scene->gravity[k];
+    c->exchange.force.def = (silt_force_def){.added_mass = grains->added_mass,
+                                             .theta = scene->fluid.theta,
+                                             .viscous = grains->viscous_force,
+                                             .lift = grains->lift == LIFT_SAFFMAN,
+                                             .spin = grains->rotational_drag};
+    memcpy(c->exchange.gravity, scene->gravity, sizeof c->exchange.gravity);
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
+    const bool space = c->dim == 3, periodic = scene->period[0] < scene->period[1];
     silt_coupling_walls(c);
     c->dem_def = (silt_dem_def){
         .worker = def->worker,
         .log = def->log,
-        .lo = {def->lo[0], def->lo[1]},
-        .hi = {def->hi[0], def->hi[1]},
+        .dim = c->dim,
+        .lo = {periodic ? scene->period[0] : def->lo[0], def->lo[1], def->lo[2]},
+        .hi = {periodic ? scene->period[1] : def->hi[0], def->hi[1], def->hi[2]},
+        .periodic = periodic,
         .period = period_share * 2.0 * largest,
-        .gravity = {scene->gravity[0], scene->gravity[1], 0.0},
+        .gravity = {scene->gravity[0], scene->gravity[1], scene->gravity[2]},
         .youngs_modulus = contact->youngs_modulus,
         .poissons_ratio = contact->poissons_ratio,
         .restitution = contact->restitution,
@@ -155,11 +160,13 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .rolling_friction = contact->rolling_friction,
         .body_friction = contact->body_friction,
         .step = c->step,
-        .n_wall = c->walls->count,
+        .n_wall = space ? 0 : c->walls->count,
         .wall = (const double(*)[4])c->wall,
+        .n_triangle = space ? c->walls->count : 0,
+        .triangle = (const double(*)[10])c->triangle,
         .wall_motion = c->wall_motion,
         .n_motion = c->n_motion,
-        .motion = (const double(*)[2])c->pivot,
+        .motion = (const double(*)[3])c->pivot,
         .max_radius = largest,
         .min_radius = smallest,
         .no_contacts = !scene->bed.on || !scene->bed.deposition,
@@ -173,11 +180,13 @@ static void coupling_touched(silt_coupling *c) {
     c->found = c->view->fresh = false;
 }
 
-static coupling_grain *coupling_append(silt_coupling *c, const double x[2], const double v[2], double radius) {
+static coupling_grain *coupling_append(silt_coupling *c, const double *x, const double *v, double radius) {
     SILT_RESERVE(c->grain, c->grain_capacity, c->n_grain + 1);
     coupling_grain *g = &c->grain[c->n_grain++];
     coupling_touched(c);
-    *g = (coupling_grain){.id = c->next_id++, .near = -1, .x = {x[0], x[1]}, .v = {v[0], v[1]}, .radius = radius};
+    *g = (coupling_grain){.id = c->next_id++, .near = -1, .radius = radius};
+    memcpy(g->x, x, (size_t)c->dim * sizeof *x);
+    memcpy(g->v, v, (size_t)c->dim * sizeof *v);
     return g;
 }
 
@@ -372,7 +381,7 @@ static bool coupling_find(silt_coupling *c, const silt_nodes *nodes, const silt_
         memcpy(to->spin, g->omega, sizeof to->spin);
         to->gyration = sqrt(0.4) * g->radius;
         to->held = g->fixed;
-        to->force[0] = to->force[1] = 0.0;
+        memset(to->force, 0, sizeof to->force);
         memset(to->torque, 0, sizeof to->torque);
         to->cell = coupling_locate(c, g, nodes, mesh, &located, to->weight);
         c->wet = c->wet || to->cell >= 0;
@@ -412,7 +421,7 @@ static void coupling_load(silt_coupling *c, const silt_nodes *nodes, const silt_
         c->exchange.totals = (silt_exchange_totals){0};
     for (int i = 0; i < c->n_grain; i++) {
         const bool loaded = c->wet && i < c->n_loaded;
-        for (int k = 0; k < 2; k++)
+        for (int k = 0; k < c->dim; k++)
             c->grain[i].force[k] = loaded ? c->exchange.grain[i].force[k] : 0.0;
         for (int k = 0; k < 3; k++)
             c->grain[i].torque[k] = loaded ? c->exchange.grain[i].torque[k] : 0.0;
@@ -422,7 +431,7 @@ static void coupling_load(silt_coupling *c, const silt_nodes *nodes, const silt_
 static void coupling_exchanged(const silt_coupling *c, silt_exchanged *exchanged) {
     const silt_exchange_totals *t = &c->exchange.totals;
     *exchanged = (silt_exchanged){.size = t->size};
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < c->dim; k++) {
         exchanged->grains[k] = t->pressure[k] + t->drag[k];
         exchanged->water[k] = t->water[k];
         exchanged->contact[k] = c->contact[k];
@@ -480,13 +489,11 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     memset(c->force, 0, 3 * (size_t)c->n_last * sizeof *c->force);
     for (int i = 0, k = 0; i < c->n_grain; i++) {
         coupling_grain *g = &c->grain[i];
-        for (int d = 0; d < 2; d++) {
-            g->old_x[d] = g->x[d];
-            g->old_v[d] = g->v[d];
-        }
+        memcpy(g->old_x, g->x, sizeof g->old_x);
+        memcpy(g->old_v, g->v, sizeof g->old_v);
         while (k < c->n_last && c->last[k] < g->id)
             k++;
-        for (int d = 0; d < 2 && k < c->n_last && c->last[k] == g->id; d++)
+        for (int d = 0; d < c->dim && k < c->n_last && c->last[k] == g->id; d++)
             c->force[3 * k + d] = g->force[d] * c->width * silt_coupling_burden(c, g);
     }
     silt_coupling_twist(c);
@@ -506,27 +513,6 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     return silt_dem_start(c->dem, n, c->force, c->body_force, c->body_torque, err);
 }
 
-// true when the way from a to b leads over an outlet from left to right, or a is within `near` of one
-static bool coupling_leaves(const silt_fluid_def *fluid, const double a[2], const double b[2], double near) {
-    for (int i = 0; i < fluid->n_outlet; i++) {
-        const double *from = fluid->outlet[i].from, *to = fluid->outlet[i].to;
-        double e[2] = {to[0] - from[0], to[1] - from[1]}, square = e[0] * e[0] + e[1] * e[1];
-        double d[2] = {a[0] - from[0], a[1] - from[1]};
-        double side_a = e[0] * d[1] - e[1] * d[0], side_b = e[0] * (b[1] - from[1]) - e[1] * (b[0] - from[0]);
-        double t = silt_clamp((e[0] * d[0] + e[1] * d[1]) / square, 0.0, 1.0);
-        if (near > 0.0 && hypot(d[0] - t * e[0], d[1] - t * e[1]) <= near)
-            return true;
-        if (side_a < 0.0 || side_b >= 0.0)
-            continue;
-        double s = side_a / (side_a - side_b);
-        double x[2] = {a[0] + s * (b[0] - a[0]) - from[0], a[1] + s * (b[1] - a[1]) - from[1]};
-        double along = (e[0] * x[0] + e[1] * x[1]) / square;
-        if (along >= 0.0 && along <= 1.0)
-            return true;
-    }
-    return false;
-}
-
 static void coupling_leave(silt_coupling *c, coupling_grain *g) {
     c->left_mass += g->mass;
     c->left_count++;
@@ -542,19 +528,21 @@ static void coupling_receive(silt_coupling *c, coupling_grain *g, const silt_dem
     g->on_bed = state->on_bed[k];
     if (!(c->elapsed > 0.0))
         return;
-    double net[2];
-    for (int d = 0; d < 2; d++) {
+    double net[3];
+    for (int d = 0; d < c->dim; d++) {
         net[d] = g->mass * (g->v[d] - g->old_v[d]) / c->elapsed;
         g->contact[d] = net[d] - g->force[d] - g->mass * c->scene->gravity[d];
         c->contact[d] += g->contact[d];
     }
-    g->net = hypot(net[0], net[1]);
+    g->net = silt_length(c->dim, net);
 }
 
 // a grain that LIGGGHTS no longer has: over an outlet, or lost
 static bool coupling_left_domain(const silt_coupling *c, const coupling_grain *g) {
-    const double ahead[2] = {g->old_x[0] + 2.0 * c->elapsed * g->v[0], g->old_x[1] + 2.0 * c->elapsed * g->v[1]};
-    return coupling_leaves(&c->scene->fluid, g->old_x, ahead, 4.0 * g->radius);
+    double ahead[3];
+    for (int d = 0; d < 3; d++)
+        ahead[d] = g->old_x[d] + 2.0 * c->elapsed * g->v[d];
+    return silt_coupling_leaves(c, g->old_x, ahead, 4.0 * g->radius);
 }
 
 // nothing is changed before it is sure that no grain is lost
@@ -577,7 +565,7 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
     SILT_TRY(silt_dem_wait(c->dem, err));
     const silt_dem_state *state = silt_dem_state_now(c->dem);
     SILT_TRY(coupling_complete(c, state, err));
-    c->contact[0] = c->contact[1] = 0.0;
+    memset(c->contact, 0, sizeof c->contact);
     if (c->elapsed > 0.0)
         silt_coupling_walls_stand(c);
     coupling_touched(c);
@@ -589,7 +577,7 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
             silt_coupling_hold(c, g);
         } else if (k < state->n_grain && state->id[k] == g->id) {
             coupling_receive(c, g, state, k);
-            if (coupling_leaves(&c->scene->fluid, g->old_x, g->x, 0.0))
+            if (silt_coupling_leaves(c, g->old_x, g->x, 0.0))
                 coupling_leave(c, g);
         } else {
             g->sent = false;
@@ -621,6 +609,7 @@ static silt_status coupling_create(silt_coupling **coupling, const silt_coupling
     silt_coupling *c = *coupling = silt_alloc(1, sizeof *c);
     c->scene = def->scene;
     c->walls = def->walls;
+    c->dim = def->scene->dimension == 3 ? 3 : 2;
     c->next_id = c->sent_id = 1;
     c->view = silt_alloc(1, sizeof *c->view);
     SILT_TRY(coupling_shapes(c, err));
@@ -678,8 +667,7 @@ static void coupling_listed(silt_coupling *c) {
         g->diameter = def->diameter;
         g->number = 1.0 / c->width;
         g->fixed = coupling_fixes(c, g->id);
-        if (g->fixed)
-            memset(g->v, 0, sizeof g->v);
+        memset(g->v, 0, g->fixed ? sizeof g->v : 0);
     }
 }
 
@@ -710,6 +698,7 @@ static void coupling_close(silt_coupling **coupling) {
         return;
     silt_dem_close(&c->dem);
     free(c->wall);
+    free(c->triangle);
     for (int i = 0; i < c->bodies->count; i++) {
         silt_outline_clear(&c->body[i].shape);
         silt_clump_clear(&c->body[i].clump);

@@ -29,7 +29,7 @@ struct silt_dem {
     int64_t *remove;      // owned
     silt_dem_sphere *add; // owned
     const double *torque; // borrowed, of the next run, NULL: none
-    double (*rate)[3]; // owned, velocity and spin of every motion
+    double (*rate)[4]; // owned, velocity and spin of every motion
     int n_solid, cap_solid, n_free, n_free_sphere;
     dem_solid *solid; // owned
     // the last state, owned
@@ -69,28 +69,9 @@ void silt_dem_close(silt_dem **dem) {
     dem_link_close(&d->link);
     for (int k = 0; k < d->n_solid; k++)
         free((void *)d->solid[k].def.sphere);
-    void *owned[] = {(void *)d->def.worker,
-                     (void *)d->def.log,
-                     (void *)d->def.wall,
-                     (void *)d->def.wall_motion,
-                     (void *)d->def.motion,
-                     d->rate,
-                     d->live,
-                     d->remove,
-                     d->add,
-                     d->solid,
-                     d->id,
-                     d->x,
-                     d->v,
-                     d->omega,
-                     d->radius,
-                     d->mass,
-                     d->contacts,
-                     d->on_bed,
-                     d->body_x,
-                     d->body_v,
-                     d->body_omega,
-                     d->body_q};
+    void *owned[] = {(void *)d->def.worker, (void *)d->def.log, (void *)d->def.wall, (void *)d->def.triangle, (void *)d->def.wall_motion,
+                     (void *)d->def.motion, d->rate, d->live, d->remove, d->add, d->solid, d->id, d->x, d->v, d->omega,
+                     d->radius, d->mass, d->contacts, d->on_bed, d->body_x, d->body_v, d->body_omega, d->body_q};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
     free(d);
@@ -109,14 +90,19 @@ static silt_status dem_create(silt_dem **dem, const silt_dem_def *def, bool appe
     if (def->n_wall)
         memcpy(wall, def->wall, (size_t)def->n_wall * sizeof *wall);
     d->def.wall = (const double(*)[4])wall;
-    int *moves = silt_alloc((size_t)def->n_wall + 1, sizeof *moves);
-    for (int k = 0; k < def->n_wall; k++)
+    double(*triangle)[10] = silt_alloc((size_t)def->n_triangle + 1, sizeof *triangle);
+    if (def->n_triangle)
+        memcpy(triangle, def->triangle, (size_t)def->n_triangle * sizeof *triangle);
+    d->def.triangle = (const double(*)[10])triangle;
+    const int n_wall = def->n_wall + def->n_triangle;
+    int *moves = silt_alloc((size_t)n_wall + 1, sizeof *moves);
+    for (int k = 0; k < n_wall; k++)
         moves[k] = def->wall_motion ? def->wall_motion[k] : -1;
     d->def.wall_motion = moves;
-    double(*motion)[2] = silt_alloc((size_t)def->n_motion + 1, sizeof *motion);
+    double(*motion)[3] = silt_alloc((size_t)def->n_motion + 1, sizeof *motion);
     if (def->n_motion)
         memcpy(motion, def->motion, (size_t)def->n_motion * sizeof *motion);
-    d->def.motion = (const double(*)[2])motion;
+    d->def.motion = (const double(*)[3])motion;
     d->rate = silt_alloc((size_t)def->n_motion + 1, sizeof *d->rate);
     d->last_id = INT64_MIN;
     d->next_tag = 1;
@@ -134,16 +120,21 @@ static void dem_write_walls(const silt_dem *dem) {
     dem_shared *s = dem->link.shared;
     dem_motion *motion = DEM_SECTION(s, dem_motion, motion);
     memcpy(DEM_SECTION(s, double, wall), def->wall, (size_t)def->n_wall * sizeof *def->wall);
-    memcpy(DEM_SECTION(s, int, wall_motion), def->wall_motion, (size_t)def->n_wall * sizeof *def->wall_motion);
+    memcpy(DEM_SECTION(s, double, triangle), def->triangle, (size_t)def->n_triangle * sizeof *def->triangle);
+    memcpy(DEM_SECTION(s, int, wall_motion), def->wall_motion, (size_t)(def->n_wall + def->n_triangle) * sizeof *def->wall_motion);
     for (int k = 0; k < def->n_motion; k++) {
-        const double *rate = dem->rate[k];
-        motion[k] = (dem_motion){.centre = {def->motion[k][0], def->motion[k][1]}, .velocity = {rate[0], rate[1]}, .spin = rate[2]};
+        memcpy(motion[k].centre, def->motion[k], sizeof motion[k].centre);
+        memcpy(motion[k].velocity, dem->rate[k], sizeof motion[k].velocity);
+        motion[k].spin = dem->rate[k][3];
     }
 }
 
-void silt_dem_move_walls(silt_dem *dem, const double (*rate)[3], const double (*wall)[4]) {
+void silt_dem_move_walls(silt_dem *dem, const double (*rate)[4], const double *wall) {
     memcpy(dem->rate, rate, (size_t)dem->def.n_motion * sizeof *dem->rate);
-    memcpy((double(*)[4])(uintptr_t)dem->def.wall, wall, (size_t)dem->def.n_wall * sizeof *wall);
+    if (dem->def.dim == 3)
+        memcpy((double(*)[10])(uintptr_t)dem->def.triangle, wall, (size_t)dem->def.n_triangle * sizeof *dem->def.triangle);
+    else
+        memcpy((double(*)[4])(uintptr_t)dem->def.wall, wall, (size_t)dem->def.n_wall * sizeof *dem->def.wall);
 }
 
 // the fixed numbers into the shared memory, the free bodies if asked; then LIGGGHTS starts
@@ -155,6 +146,8 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     memcpy(s->lo, def->lo, sizeof s->lo);
     memcpy(s->hi, def->hi, sizeof s->hi);
     memcpy(s->gravity, def->gravity, sizeof s->gravity);
+    s->dim = def->dim == 3 ? 3 : 2;
+    s->periodic = def->periodic;
     s->period = def->period;
     s->youngs_modulus = def->youngs_modulus;
     s->poissons_ratio = def->poissons_ratio;
@@ -166,6 +159,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->max_radius = def->max_radius;
     s->min_radius = def->min_radius;
     s->n_wall = def->n_wall;
+    s->n_triangle = def->n_triangle;
     s->n_motion = def->n_motion;
     s->no_contacts = def->no_contacts;
     s->n_body = bodies ? dem->n_free : 0;
@@ -344,8 +338,8 @@ static silt_status dem_take(silt_dem *dem, silt_error *err) {
             const dem_grain *g = &grain[row];
             if (!silt_dem_finite(3, g->x) || !silt_dem_finite(3, g->v) || !silt_dem_finite(3, g->omega)) {
                 return dem_link_give_up(&dem->link, err,
-                                        "grain %lld is not finite after the run: x (%g, %g), v (%g, %g)",
-                                        (long long)live->id, g->x[0], g->x[1], g->v[0], g->v[1]);
+                                        "grain %lld is not finite after the run: x %s, v %s", (long long)live->id,
+                                        silt_dem_place(&dem->def, g->x).text, silt_dem_place(&dem->def, g->v).text);
             }
             dem->id[row] = live->id;
             memcpy(&dem->x[3 * row], g->x, sizeof g->x);
@@ -405,17 +399,20 @@ static silt_status dem_check_add(const silt_dem *dem, silt_error *err) {
             return silt_fail(err, SILT_FAILED,
                              "sphere %lld was added after sphere %lld; ids must rise and are used once", id,
                              (long long)last);
-        if (!silt_dem_finite(2, a->x) || !silt_dem_finite(2, a->v) || !isfinite(a->omega[2]))
-            return silt_fail(err, SILT_FAILED, "sphere %lld is not finite: x (%g, %g), v (%g, %g), omega %g", id,
-                             a->x[0], a->x[1], a->v[0], a->v[1], a->omega[2]);
+        if (!silt_dem_finite(3, a->x) || !silt_dem_finite(3, a->v) || !silt_dem_finite(3, a->omega))
+            return silt_fail(err, SILT_FAILED, "sphere %lld is not finite: x %s, v %s, omega (%g, %g, %g)", id,
+                             silt_dem_place(&dem->def, a->x).text, silt_dem_place(&dem->def, a->v).text, a->omega[0], a->omega[1], a->omega[2]);
         if (!(a->radius > 0) || a->radius > def->max_radius * (1 + 1e-12) || !(a->density > 0) || !isfinite(a->density))
             return silt_fail(
                 err, SILT_FAILED,
                 "sphere %lld has radius %g m and density %g kg/m3; the radius must be above 0 and at most %g m", id,
                 a->radius, a->density, def->max_radius);
-        if (a->x[0] < def->lo[0] || a->x[0] >= def->hi[0] || a->x[1] < def->lo[1] || a->x[1] >= def->hi[1])
-            return silt_fail(err, SILT_FAILED, "sphere %lld at (%g, %g) lies outside the box (%g, %g) to (%g, %g)", id,
-                             a->x[0], a->x[1], def->lo[0], def->lo[1], def->hi[0], def->hi[1]);
+        bool outside = false;
+        for (int d = 0; d < (def->dim == 3 ? 3 : 2); d++)
+            outside |= a->x[d] < def->lo[d] || a->x[d] >= def->hi[d];
+        if (outside)
+            return silt_fail(err, SILT_FAILED, "sphere %lld at %s lies outside the box %s to %s", id, silt_dem_place(&dem->def, a->x).text,
+                             silt_dem_place(&dem->def, def->lo).text, silt_dem_place(&dem->def, def->hi).text);
         last = a->id;
     }
     return SILT_OK;
@@ -425,8 +422,8 @@ static silt_status dem_check_load(const silt_dem *dem, const double *force, cons
                                   const double *body_torque, silt_error *err) {
     for (int k = 0; force && k < dem->state.n_grain; k++)
         if (!silt_dem_finite(3, &force[3 * k]))
-            return silt_fail(err, SILT_FAILED, "the force on grain %lld at (%g, %g) is not finite: (%g, %g)",
-                             (long long)dem->id[k], dem->x[3 * k], dem->x[3 * k + 1], force[3 * k], force[3 * k + 1]);
+            return silt_fail(err, SILT_FAILED, "the force on grain %lld at %s is not finite: %s", (long long)dem->id[k],
+                             silt_dem_place(&dem->def, &dem->x[3 * k]).text, silt_dem_place(&dem->def, &force[3 * k]).text);
     for (int k = 0; k < dem->n_solid; k++)
         if ((body_force && !silt_dem_finite(3, &body_force[3 * k])) || (body_torque && !silt_dem_finite(3, &body_torque[3 * k])))
             return silt_fail(err, SILT_FAILED, "the force or torque on rigid body %d at (%g, %g) is not finite", k,

@@ -1,7 +1,7 @@
 /** @file dem.h
  * The discrete elements: a worker process (silt-dem) that links LIGGGHTS, driven through shared memory, one instruction
- * a coupling step. This side never loads LIGGGHTS, MPI or VTK. Everything is three-dimensional inside (a slab, periodic
- * in z, all z = 0 in 2-D): masses and forces in this header are of the real spheres (kg, N), not per metre of width.
+ * a coupling step. This side never loads LIGGGHTS, MPI or VTK. Everything is three-dimensional inside (in 2-D a slab, periodic
+ * in z, all z = 0): masses and forces in this header are of the real spheres (kg, N), not per metre of width.
  */
 #ifndef SILT_DEM_H
 #define SILT_DEM_H
@@ -15,17 +15,21 @@ typedef struct silt_dem_def {
     const char *worker;  // path of silt-dem
     const char *log;     // file that LIGGGHTS writes to (its screen), e.g. OUT/dem.log
     bool append;         // to what stands in it
-    double lo[2], hi[2]; // the box in x and y; a sphere that leaves it is gone
-    double period;       // m, periodic length in z (at least 3 times the largest sphere's diameter)
+    int dim;             // 3: space; 2 or 0: the slab
+    double lo[3], hi[3]; // the box (slab: in x and y); a sphere that leaves it is gone
+    bool periodic;       // in x: what leaves the box there comes in at the other end
+    double period;       // m, slab: periodic length in z (at least 3 times the largest sphere's diameter)
     double gravity[3];
     double youngs_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
     double step; // s, DEM time step, fixed for the run
     int n_wall;
     const double (
         *wall)[4];     // from_x, from_y, to_x, to_y: straight walls, infinitely deep in z, contact from both sides
-    const int *wall_motion; // per wall: which of the motions it follows, -1: stands still; NULL: all do
+    int n_triangle;
+    const double (*triangle)[10]; // space: corners, then bits of the edges (1: from the first corner) that no other triangle joins
+    const int *wall_motion; // per wall and triangle: which of the motions it follows, -1: stands still; NULL: all do
     int n_motion;
-    const double (*motion)[2]; // m, what each motion turns about, at its present place
+    const double (*motion)[3]; // m, what each motion turns about, at its present place
     double max_radius; // m, largest sphere that will ever come (neighbour cut-off)
     double min_radius;
     bool no_contacts; // contacts and on_bed of the state are not asked for (ten thousand grains: 0.4 ms a run)
@@ -86,9 +90,10 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
                            const double *body_torque, silt_error *err);
 /** Torques on the grains in the next run, 3 per grain in the order of the last state, N m; borrowed until then */
 void silt_dem_twist(silt_dem *dem, const double *torque);
-/** How the walls that move do so in the next runs, as stiff pieces: 3 numbers per motion, velocity in m/s and spin in rad/s; and where
- * they stand at the end of the next run, 4 numbers per wall as in the definition. */
-void silt_dem_move_walls(silt_dem *dem, const double (*rate)[3], const double (*wall)[4]);
+/** How the walls that move do so in the next runs, as stiff pieces: 4 numbers per motion, velocity in m/s and spin in rad/s, in the
+ * plane from x to y, in space from x to z; and where they stand at the end of the next run, the numbers of the definition's walls or
+ * triangles. */
+void silt_dem_move_walls(silt_dem *dem, const double (*rate)[4], const double *wall);
 /** The next run may go on from where the last one ended, with its neighbour lists and without a set-up. A run is set up all the
  * same when there are edits or free bodies, and after a save or load. How the lists came about decides the order of sums: the
  * same bits come again only when set-ups come at the same steps again. */

@@ -10,4 +10,10 @@ bool silt_dem_finite(int n, const double *value);
 /** SILT_FAILED: which number is none that LIGGGHTS can use */
 silt_status silt_dem_check(const silt_dem_def *def, silt_error *err);
 
+/** a place as it stands in messages: two numbers in the slab, three in space */
+typedef struct silt_dem_text {
+    char text[96];
+} silt_dem_text;
+silt_dem_text silt_dem_place(const silt_dem_def *def, const double *x);
+
 #endif

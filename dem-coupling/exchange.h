@@ -1,6 +1,7 @@
 /** @file exchange.h
  * Grains in water, both ways: solid fraction, drag, pressure-gradient force and the grains' share of continuity. One
- * kernel spreads and samples, so that what the grains gain the water loses. 2-D, everything per metre of width.
+ * kernel spreads and samples, so that what the grains gain the water loses. In the plane and in space; in the plane everything
+ * is per metre of width and the third component of what has three is not looked at.
  *
  * Model A: F = -V grad p + beta (u - v), with u and grad p sampled through the kernel. The drag is implicit on both
  * sides: beta_eff = beta / (1 + dt beta/m),  v_free = v + dt (g + (F_pressure + F_contact)/m), F_drag = beta_eff (u -
@@ -16,38 +17,38 @@
 
 typedef struct silt_exchange_grain {
     // given before prepare
-    double x[2], v[2];
+    double x[3], v[3];
     double solid;      // m3/m, solid volume
     double mass;       // kg/m
     double diameter;   // m, of the grains that the drag law sees
     double number;     // 1/m, how many of these the parcel is, per metre of width
-    double contact[2]; // N/m, of contacts in the last step
+    double contact[3]; // N/m, of contacts in the last step
     double spin[3];    // 1/s; looked at where there is a torque on it
     double gyration;   // m, radius of gyration of the sphere that spins, sqrt(0.4) times its radius
     bool held;         // stays as fast as it is, whatever acts on it
     int cell;          // of the water's mesh, -1: not in the water
-    double weight[3];  // barycentric, in that cell
+    double weight[4];  // barycentric, in that cell
     // results of load
-    double water[2];    // m/s, the water's velocity at the grain
+    double water[3];    // m/s, the water's velocity at the grain
     double effective;   // kg/(s m), beta_eff
-    double free[2];     // m/s, v_free of the last update
-    double pressure[2]; // N/m, force of the pressure gradient
-    double force[2];    // N/m, all of the water's force; out of the water as it was before
+    double free[3];     // m/s, v_free of the last update
+    double pressure[3]; // N/m, force of the pressure gradient
+    double force[3];    // N/m, all of the water's force; out of the water as it was before
     double torque[3];   // N m/m, the water's, where it is asked for
 } silt_exchange_grain;
 
 /** what passed between grains and water in a step, N per m of width */
 typedef struct silt_exchange_totals {
-    double pressure[2]; // of the pressure gradient on grains
-    double drag[2];     // of drag on grains, and of all other forces but the pressure gradient's
-    double water[2];    // of these on the water: sum over nodes of push - coefficient u; minus drag to rounding
+    double pressure[3]; // of the pressure gradient on grains
+    double drag[3];     // of drag on grains, and of all other forces but the pressure gradient's
+    double water[3];    // of these on the water: sum over nodes of push - coefficient u; minus drag to rounding
     double size;        // sum over grains of the magnitudes of both parts
 } silt_exchange_totals;
 
 /** a cell of the water near to grains */
 typedef struct exchange_cell {
     int at[4];    // corners, among the nodes that are looked at
-    double least; // m2, twice the area below which the cell counts as at the start of the step
+    double least; // m2, plane: twice the area below which the cell counts as at the start of the step
 } exchange_cell;
 
 /** eight grains in the water: what a step's updates read and write of them */
@@ -65,7 +66,7 @@ typedef struct silt_exchange {
     // given once
     silt_drag_law law;
     double density, viscosity; // of the water
-    double gravity[2];
+    double gravity[3];
     double width; // m, of the kernel
     silt_forces force; // its def; forces besides drag and pressure gradient
     bool refresh; // update also renews the coefficients; the fluid must then read them anew
@@ -80,6 +81,7 @@ typedef struct silt_exchange {
     const silt_mesh *mesh; // borrowed from prepare to load, so are the positions at the start of the step
     const double *x;
     double dt;
+    int dim;    // of the mesh
     int n_node;
     double *solid, *coefficient, *push, *source; // owned, per node
     double *read, *give;                         // owned, fields through the kernel, in its order
@@ -88,17 +90,17 @@ typedef struct silt_exchange {
     int n_group;
     struct exchange_group *group; // owned, of those
     uint8_t *chosen;                             // owned, per node: the kernel holds it
-    double *placed_x;                            // owned, 2 per node, positions at the last place
+    double *placed_x;                            // owned, dim per node, positions at the last place
     bool placed;
     int64_t revision; // of the mesh then
     int n_placed_cell, *bin; // owned, grid around the grains
     int *index;              // owned, per node of the mesh: among those that are looked at
     int n_look, *look;       // owned, nodes that an update looks at: the kernel's in its order, then others of their cells
-    double (*rest)[2];       // owned, m, of those, positions at the start of the step
-    double (*middle)[2];     // owned, m, at its middle
-    double (*seen)[3];       // owned, of those, velocity and pressure of the last iterate
-    double (*spare)[3];      // owned, room for another
-    double *volume, *flow;   // owned, of those, m2 and m2/s
+    double *rest;            // owned, m, dim per node of those, positions at the start of the step
+    double *middle;          // owned, m, at its middle
+    double *seen;            // owned, of those, velocity and pressure (dim + 1 numbers) of the last iterate
+    double *spare;           // owned, room for another
+    double *volume, *flow;   // owned, of those, m2 and m2/s (m3, m3/s)
     int node_capacity[9], look_capacity[7], cell_capacity, bin_capacity, wet_capacity, group_capacity;
 } silt_exchange;
 

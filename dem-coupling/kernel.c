@@ -14,43 +14,61 @@ static void kernel_choose(silt_kernel *kernel, const silt_mesh *mesh, const uint
             kernel->node[kernel->n_node++] = i;
     for (int e = 0; e < mesh->n_cell; e++) {
         const int *node = mesh->cell[e];
-        if (chosen[node[0]] || chosen[node[1]] || chosen[node[2]])
+        if (chosen[node[0]] || chosen[node[1]] || chosen[node[2]] || (kernel->dim == 3 && chosen[node[3]]))
             kernel->near[kernel->n_near++] = e;
     }
 }
 
+// area of a triangle and b^2/4 K between its corners
+static double kernel_triangle(const double c[12], double scale, double edge[3]) {
+    const double *a = c, *b = c + 2, *d = c + 4;
+    const double twice = (b[0] - a[0]) * (d[1] - a[1]) - (b[1] - a[1]) * (d[0] - a[0]);
+    // gradients are the sides across, turned and over `twice`
+    const double side[3][2] = {{d[0] - b[0], d[1] - b[1]}, {a[0] - d[0], a[1] - d[1]}, {b[0] - a[0], b[1] - a[1]}};
+    const double weight = scale / (2.0 * twice);
+    for (int k = 0; k < 3; k++) {
+        const double *p = side[(k + 1) % 3], *q = side[(k + 2) % 3];
+        edge[k] = weight * (p[0] * q[0] + p[1] * q[1]);
+    }
+    return twice / 2.0;
+}
+
 // lumped volumes, and b^2/4 K cell by cell
 static silt_status kernel_measure(silt_kernel *kernel, const silt_mesh *mesh, const double *x, double width, silt_error *err) {
+    const int D = kernel->dim, n_edge = D == 3 ? 6 : 3;
     SILT_RESERVE(kernel->volume, kernel->node_capacity[2], mesh->n_node);
     SILT_RESERVE(kernel->area, kernel->cell_capacity[1], mesh->n_cell);
-    SILT_RESERVE(kernel->edge, kernel->cell_capacity[2], mesh->n_cell);
+    SILT_RESERVE(kernel->edge, kernel->cell_capacity[2], n_edge * mesh->n_cell);
     memset(kernel->volume, 0, (size_t)mesh->n_node * sizeof *kernel->volume);
     for (int k = 0; k < kernel->n_near; k++) {
         const int e = kernel->near[k], *node = mesh->cell[e];
-        const double *a = x + 2 * node[0], *b = x + 2 * node[1], *c = x + 2 * node[2];
-        double twice = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        if (!(twice > 0.0))
-            return silt_fail(
-                err, SILT_FAILED,
-                "porosity kernel: water cell %d (nodes %d %d %d) near (%g, %g) has the area %g m2, must be above 0", e,
-                node[0], node[1], node[2], a[0], a[1], twice / 2.0);
-        kernel->area[e] = twice / 2.0;
-        // gradients are the sides across, turned and over `twice`
-        const double side[3][2] = {{c[0] - b[0], c[1] - b[1]}, {a[0] - c[0], a[1] - c[1]}, {b[0] - a[0], b[1] - a[1]}};
-        const double weight = width * width / 4.0 / (2.0 * twice);
-        for (int d = 0; d < 3; d++) {
-            const double *p = side[(d + 1) % 3], *q = side[(d + 2) % 3];
-            kernel->edge[e][d] = weight * (p[0] * q[0] + p[1] * q[1]);
-            kernel->volume[node[d]] += twice / 6.0;
-        }
+        double c[12], *edge = kernel->edge + n_edge * e;
+        silt_cell_corners(mesh, x, node, c);
+        const double volume = D == 3 ? silt_sweep_cell(c, width * width / 4.0, edge) : kernel_triangle(c, width * width / 4.0, edge);
+        if (!(volume > 0.0))
+            return silt_fail(err, SILT_FAILED, "porosity kernel: water cell %d (nodes %d %d %d%s) near (%g, %g) has the %s %g m%d, must be above 0",
+                             e, node[0], node[1], node[2], D == 3 ? ", ..." : "", c[0], c[1], D == 3 ? "volume" : "area", volume, D);
+        kernel->area[e] = volume;
+        for (int a = 0; a <= D; a++)
+            kernel->volume[node[a]] += volume / (D + 1);
     }
     return SILT_OK;
 }
 
 silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const double *x, const uint8_t *chosen,
                               double width, silt_error *err) {
+    kernel->dim = mesh->dim == 3 ? 3 : 2;
     kernel_choose(kernel, mesh, chosen);
     SILT_TRY(kernel_measure(kernel, mesh, x, width, err));
+    if (kernel->dim == 3) {
+        for (int i = 0; i < mesh->n_node; i++)
+            kernel->place[i] = kernel->n_node;
+        for (int k = 0; k < kernel->n_node; k++)
+            kernel->place[kernel->node[k]] = k;
+        silt_sweep_build(&kernel->sweep, mesh, kernel->n_node, kernel->node, kernel->place, kernel->volume, kernel->edge,
+                         width * width / 4.0);
+        return SILT_OK;
+    }
     // a node without a cell keeps what is asked of it
     SILT_RESERVE(kernel->diagonal, kernel->node_capacity[3], mesh->n_node);
     for (int k = 0; k < kernel->n_node; k++) {
@@ -67,7 +85,10 @@ silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const 
 }
 
 void silt_kernel_solve(const silt_kernel *kernel, int n_field, double *field) {
-    silt_nested_solve(kernel->nested, n_field, field);
+    if (kernel->dim == 3)
+        silt_sweep_solve(&kernel->sweep, n_field, field);
+    else
+        silt_nested_solve(kernel->nested, n_field, field);
 }
 
 void silt_kernel_smooth(silt_kernel *kernel, double *field) {
@@ -83,6 +104,7 @@ void silt_kernel_smooth(silt_kernel *kernel, double *field) {
 
 void silt_kernel_clear(silt_kernel *kernel) {
     silt_nested_free(&kernel->nested);
+    silt_sweep_clear(&kernel->sweep);
     void *owned[] = {kernel->volume, kernel->area,  kernel->edge, kernel->diagonal,
                      kernel->node,   kernel->place, kernel->near, kernel->work};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)

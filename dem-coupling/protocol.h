@@ -49,19 +49,20 @@ typedef struct dem_body {
 
 /** how a wall moves during a run: the surfaces that carry its number, as one stiff piece */
 typedef struct dem_motion {
-    double centre[2]; // m, what it turns about, where it is when LIGGGHTS starts
-    double velocity[2], spin; // m/s, rad/s, of the run
+    double centre[3]; // m, what it turns about, where it is when LIGGGHTS starts
+    double velocity[3], spin; // m/s, rad/s, of the run; in the plane from x to y, in space from x to z
 } dem_motion;
 
 typedef struct dem_shared {
     uint64_t size; // bytes of the memory file; the worker maps again when it grew
     // the numbers of silt_dem_def
-    double lo[2], hi[2], period, gravity[2];
+    int dim, periodic;
+    double lo[3], hi[3], period, gravity[3];
     double youngs_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
     double step, max_radius, min_radius;
     int resume, no_contacts;
     // lengths of the sections
-    int n_wall, n_motion, n_body, n_body_sphere, n_remove, n_add, n_force, n_torque, max_grain;
+    int n_wall, n_triangle, n_motion, n_body, n_body_sphere, n_remove, n_add, n_force, n_torque, max_grain;
     int n_step;
     int keep; // 1: this run may go on from the last one's end
     // answer
@@ -70,8 +71,9 @@ typedef struct dem_shared {
     double cpu_all;      // CPU time since the last answer
     char text[1024]; // why the worker gave up, or empty
     // sections, bytes from the start
-    uint64_t wall;        // 4 double per wall, where it is when LIGGGHTS starts, or when the run ends
-    uint64_t wall_motion; // int per wall: which motion it has, -1: none
+    uint64_t wall;        // plane: 4 double per wall, where it is when LIGGGHTS starts, or when the run ends
+    uint64_t triangle;    // space: 10 double per triangle of a wall
+    uint64_t wall_motion; // int per wall and triangle: which motion it has, -1: none
     uint64_t motion;      // dem_motion
     uint64_t body;        // dem_body
     uint64_t body_sphere; // 3 double: x, y from the centroid, radius
@@ -90,7 +92,8 @@ static inline uint64_t dem_shared_layout(dem_shared *s) {
     uint64_t end = (sizeof *s + 63) & ~(uint64_t)63;
 #define DEM_PLACE(name, count, type) (s->name = end, end += ((uint64_t)(count) * sizeof(type) + 63) & ~(uint64_t)63)
     DEM_PLACE(wall, 4 * s->n_wall, double);
-    DEM_PLACE(wall_motion, s->n_wall, int);
+    DEM_PLACE(triangle, 10 * s->n_triangle, double);
+    DEM_PLACE(wall_motion, s->n_wall + s->n_triangle, int);
     DEM_PLACE(motion, s->n_motion, dem_motion);
     DEM_PLACE(body, s->n_body, dem_body);
     DEM_PLACE(body_sphere, 3 * s->n_body_sphere, double);

@@ -186,6 +186,158 @@ static void script_strip(FILE *file, const dem_shared *s, const double w[4]) {
     }
 }
 
+// ---- walls in space
+
+// 0 to 2: the triangles in that plane across this axis are the whole face of the box that all triangles span, and others close its
+// rim: nothing is there to tell it from the infinite plane; else -1
+static int script_face(const dem_shared *s, int i) {
+    const double(*t)[10] = (const double(*)[10])DEM_SECTION(s, const double, triangle);
+    double lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY}, size = 0;
+    for (int j = 0; j < s->n_triangle; j++)
+        for (int c = 0; c < 9; c++) {
+            lo[c % 3] = fmin(lo[c % 3], t[j][c]);
+            hi[c % 3] = fmax(hi[c % 3], t[j][c]);
+        }
+    for (int k = 0; k < 3; k++)
+        size = fmax(size, hi[k] - lo[k]);
+    const double tolerance = 1e-9 * size;
+    int across = -1;
+    for (int k = 0; k < 3; k++)
+        if (fabs(t[i][k] - t[i][3 + k]) < tolerance && fabs(t[i][k] - t[i][6 + k]) < tolerance)
+            across = k;
+    if (across < 0 || (fabs(t[i][across] - lo[across]) > tolerance && fabs(t[i][across] - hi[across]) > tolerance))
+        return -1;
+    const int p = (across + 1) % 3, q = (across + 2) % 3;
+    double area = 0;
+    for (int j = 0; j < s->n_triangle; j++) {
+        bool in = true;
+        for (int c = 0; c < 3; c++)
+            in &= fabs(t[j][3 * c + across] - t[i][across]) < tolerance;
+        if (!in)
+            continue;
+        area += fabs((t[j][3 + p] - t[j][p]) * (t[j][6 + q] - t[j][q]) - (t[j][3 + q] - t[j][q]) * (t[j][6 + p] - t[j][p])) / 2;
+        // an open rim, but for that at the ends of a period
+        for (int c = 0; c < 3; c++) {
+            const double *a = &t[j][3 * c], *b = &t[j][3 * ((c + 1) % 3)];
+            const bool border = s->periodic && fabs(a[0] - b[0]) < tolerance &&
+                                (fabs(a[0] - s->lo[0]) < tolerance || fabs(a[0] - s->hi[0]) < tolerance);
+            if ((int)t[j][9] >> c & 1 && !border)
+                return -1;
+        }
+    }
+    return fabs(area - (hi[p] - lo[p]) * (hi[q] - lo[q])) < 1e-9 * size * size ? across : -1;
+}
+
+// one triangle, cut at the middle of its longest side while that is longer than `longest`: neighbours are cut alike
+static void script_triangle(FILE *file, double longest, const double t[9]) {
+    double square = 0;
+    int side = 0;
+    for (int c = 0; c < 3; c++) {
+        double sum = 0;
+        for (int d = 0; d < 3; d++)
+            sum += (t[3 * c + d] - t[3 * ((c + 1) % 3) + d]) * (t[3 * c + d] - t[3 * ((c + 1) % 3) + d]);
+        if (sum > square) {
+            square = sum;
+            side = c;
+        }
+    }
+    if (square > longest * longest) {
+        const double *a = &t[3 * side], *b = &t[3 * ((side + 1) % 3)], *c = &t[3 * ((side + 2) % 3)];
+        const double m[3] = {0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])};
+        const double half[2][9] = {{a[0], a[1], a[2], m[0], m[1], m[2], c[0], c[1], c[2]}, {m[0], m[1], m[2], b[0], b[1], b[2], c[0], c[1], c[2]}};
+        script_triangle(file, longest, half[0]);
+        script_triangle(file, longest, half[1]);
+        return;
+    }
+    double normal[3], length = 0;
+    for (int d = 0; d < 3; d++) {
+        const int e = (d + 1) % 3, f = (d + 2) % 3;
+        normal[d] = (t[3 + e] - t[e]) * (t[6 + f] - t[f]) - (t[3 + f] - t[f]) * (t[6 + e] - t[e]);
+        length += normal[d] * normal[d];
+    }
+    length = sqrt(length);
+    if (!(length > 1e-12 * square)) // nothing was left of it
+        return;
+    fprintf(file, "facet normal %.9g %.9g %.9g\nouter loop\n", normal[0] / length, normal[1] / length, normal[2] / length);
+    for (int c = 0; c < 3; c++)
+        fprintf(file, "vertex %.17g %.17g %.17g\n", t[3 * c], t[3 * c + 1], t[3 * c + 2]);
+    fprintf(file, "endloop\nendfacet\n");
+}
+
+// the file with the triangles of walls, opened when the first one comes
+static FILE *script_open_walls(FILE **file, const char *path) {
+    if (!*file && !(*file = fopen(path, "w"))) {
+        perror(path);
+        abort();
+    }
+    if (ftell(*file) == 0)
+        fprintf(*file, "solid walls\n");
+    return *file;
+}
+
+// the part of a triangle inside of the period, in pieces that are short for it
+static void script_cut(FILE *file, const dem_shared *s, const double t[9]) {
+    double point[2][8][3];
+    int n = 3, now = 0;
+    memcpy(point[0], t, 9 * sizeof *t);
+    for (int end = 0; end < 2; end++, now = !now) {
+        const double border = end ? s->hi[0] : s->lo[0], sign = end ? -1 : 1;
+        int kept = 0;
+        for (int k = 0; k < n; k++) {
+            const double *a = point[now][k], *b = point[now][(k + 1) % n];
+            const double da = sign * (a[0] - border), db = sign * (b[0] - border);
+            if (da >= 0)
+                memcpy(point[!now][kept++], a, sizeof point[0][0]);
+            if ((da > 0 && db < 0) || (da < 0 && db > 0)) {
+                // from the lower end whichever way round: neighbours cut their common side alike
+                const double *p = da < db ? a : b, *q = da < db ? b : a, share = (border - p[0]) / (q[0] - p[0]);
+                for (int d = 0; d < 3; d++)
+                    point[!now][kept][d] = d == 0 ? border : p[d] + share * (q[d] - p[d]);
+                kept++;
+            }
+        }
+        n = kept;
+    }
+    for (int k = 1; k + 1 < n; k++) {
+        double piece[9];
+        memcpy(piece, point[now][0], sizeof point[0][0]);
+        memcpy(piece + 3, point[now][k], sizeof point[0][0]);
+        memcpy(piece + 6, point[now][k + 1], sizeof point[0][0]);
+        script_triangle(file, 0.4 * (s->hi[0] - s->lo[0]), piece);
+    }
+}
+
+// planes of the triangles that make one, each told once. @return how many
+static int script_faces(void *lmp, const dem_shared *s, int *plane) {
+    const double(*t)[10] = (const double(*)[10])DEM_SECTION(s, const double, triangle);
+    const int *moves = DEM_SECTION(s, const int, wall_motion) + s->n_wall;
+    const double tolerance = 1e-9 * (s->hi[0] - s->lo[0]);
+    int n_plane = 0, told = 0;
+    for (int i = 0; i < s->n_triangle; i++) {
+        const int across = moves[i] < 0 ? script_face(s, i) : -1;
+        plane[i] = across >= 0;
+        if (across < 0)
+            continue;
+        // what closes the tank at the ends of a period closes nothing
+        if (across == 0 && s->periodic && (t[i][0] < s->lo[0] + tolerance || t[i][0] > s->hi[0] - tolerance)) {
+            plane[i] = -1;
+            continue;
+        }
+        // low and high faces of three axes
+        double other = 0;
+        for (int j = 0; j < s->n_triangle; j++)
+            other = fabs(t[j][across] - t[i][across]) > fabs(other) ? t[j][across] - t[i][across] : other;
+        const int face = 2 * across + (other < 0);
+        if (told >> face & 1)
+            continue;
+        told |= 1 << face;
+        n_plane++;
+        script_say(lmp, "fix wp%d all wall/gran %s primitive type %d %cplane %.17g", face, script_law(s), DEM_TYPE_WALL, 'x' + across,
+                   t[i][across]);
+    }
+    return n_plane;
+}
+
 // the walls' file: LIGGGHTS reads it at once
 static void script_wall_path(char path[128]) {
     snprintf(path, 128, "%s/silt-dem-%d.stl", access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp", (int)getpid());
@@ -206,13 +358,16 @@ static bool script_surface(const dem_shared *s, int motion, int *plane, const ch
             plane[i] = -1;
             continue;
         }
-        if (!file && !(file = fopen(path, "w"))) {
-            perror(path);
-            abort();
-        }
-        if (ftell(file) == 0)
-            fprintf(file, "solid walls\n");
-        script_strip(file, s, w);
+        script_strip(script_open_walls(&file, path), s, w);
+    }
+    const double(*triangle)[10] = (const double(*)[10])DEM_SECTION(s, const double, triangle);
+    for (int i = 0; i < s->n_triangle; i++) {
+        if (moves[s->n_wall + i] != motion || plane[s->n_wall + i] != 0)
+            continue;
+        if (s->periodic)
+            script_cut(script_open_walls(&file, path), s, triangle[i]);
+        else
+            script_triangle(script_open_walls(&file, path), INFINITY, triangle[i]);
     }
     if (file) {
         fprintf(file, "endsolid walls\n");
@@ -228,17 +383,15 @@ static int script_moving(void *lmp, const dem_shared *s, int *plane, FILE *names
     const dem_motion *motion = DEM_SECTION(s, const dem_motion, motion);
     char path[128];
     script_wall_path(path);
-    if (s->n_motion)
-        script_say(lmp, "variable still equal 0");
     script_motion(lmp, s);
     for (int m = 0; m < s->n_motion; m++) {
         if (!script_surface(s, m, plane, path))
             continue;
         script_say(lmp, "fix wm%d all mesh/surface file %s type %d", m, path, DEM_TYPE_WALL);
         unlink(path);
-        script_say(lmp, "fix wv%d all move/mesh mesh wm%d linear/variable v_x%d v_y%d v_still", m, m, m, m);
-        script_say(lmp, "fix wt%d all move/mesh mesh wm%d rotate/variable origin %.17g %.17g 0 axis 0 0 1 omega v_w%d", m, m,
-                   motion[m].centre[0], motion[m].centre[1], m);
+        script_say(lmp, "fix wv%d all move/mesh mesh wm%d linear/variable v_x%d v_y%d v_z%d", m, m, m, m, m);
+        script_say(lmp, "fix wt%d all move/mesh mesh wm%d rotate/variable origin %.17g %.17g %.17g axis %s omega v_w%d", m, m,
+                   motion[m].centre[0], motion[m].centre[1], motion[m].centre[2], s->dim == 3 ? "0 -1 0" : "0 0 1", m);
         there++;
         fprintf(names, " wm%d", m);
     }
@@ -251,6 +404,7 @@ void script_motion(void *lmp, const dem_shared *s) {
     for (int m = 0; m < s->n_motion; m++) {
         script_say(lmp, "variable x%d equal %.17g", m, motion[m].velocity[0]);
         script_say(lmp, "variable y%d equal %.17g", m, motion[m].velocity[1]);
+        script_say(lmp, "variable z%d equal %.17g", m, motion[m].velocity[2]);
         script_say(lmp, "variable w%d equal %.17g", m, motion[m].spin);
     }
 }
@@ -260,7 +414,7 @@ static void script_walls(void *lmp, const dem_shared *s, int *plane) {
     const int *moves = DEM_SECTION(s, const int, wall_motion);
     char path[128];
     script_wall_path(path);
-    int n_plane = 0;
+    int n_plane = script_faces(lmp, s, plane + s->n_wall);
     for (int i = 0; i < s->n_wall; i++) {
         int across = moves[i] < 0 ? script_plane(s, i) : -1;
         plane[i] = across >= 0;
@@ -293,6 +447,15 @@ static void script_walls(void *lmp, const dem_shared *s, int *plane) {
                    s->lo[1] - 10 * (s->hi[1] - s->lo[1]) - 10 * s->max_radius);
 }
 
+// the box in z
+static double script_low(const dem_shared *s) {
+    return s->dim == 3 ? s->lo[2] : -s->period / 2;
+}
+
+static double script_high(const dem_shared *s) {
+    return s->dim == 3 ? s->hi[2] : s->period / 2;
+}
+
 static double script_skin(const dem_shared *s) {
     return 0.3 * s->min_radius;
 }
@@ -304,12 +467,14 @@ static double script_skin(const dem_shared *s) {
 static double script_bin(const dem_shared *s, int n_sphere) {
     const double most = 8e6, per_bin = 2.3, per_pair = 2.0, per_visit = 1.0; // ns
     double reach = 2 * s->max_radius + script_skin(s), size[2] = {s->hi[0] - s->lo[0], s->hi[1] - s->lo[1]};
+    const bool space = s->dim == 3;
+    const double depth = space ? s->hi[2] - s->lo[2] : s->period;
     // LIGGGHTS refuses a bin a hundred times as wide as the box is somewhere
-    double best = 0, least = INFINITY, widest = 20 * fmin(s->period, fmin(size[0], size[1]));
+    double best = 0, least = INFINITY, widest = 20 * fmin(depth, fmin(size[0], size[1]));
     for (double bin = reach / 2; best == 0 || bin < widest; bin *= 1.25) {
-        double layers = fmax(1, floor(s->period / bin)), bins = (size[0] / bin + 1) * (size[1] / bin + 1) * layers;
+        double layers = fmax(1, floor(depth / bin)), bins = (size[0] / bin + 1) * (size[1] / bin + 1) * layers;
         double across = 2 * ceil(reach / bin) + 1, packed = across * bin / (2 * s->max_radius);
-        double cost = per_bin * bins + per_pair * n_sphere * fmin(packed * packed, n_sphere) / 2 +
+        double cost = per_bin * bins + per_pair * n_sphere * fmin(packed * packed * (space ? packed : 1), n_sphere) / 2 +
                       per_visit * n_sphere * across * across * fmin(across, layers) / 2;
         if (bins <= most && cost < least) {
             least = cost;
@@ -323,7 +488,7 @@ void script_open(void *lmp, const dem_shared *s, const char *restart, int *plane
     script_say(lmp, "units si");
     script_say(lmp, "atom_style sphere");
     script_say(lmp, "atom_modify map array sort 0 0");
-    script_say(lmp, "boundary f f p");
+    script_say(lmp, "boundary %c f %c", s->periodic ? 'p' : 'f', s->dim == 3 ? 'f' : 'p');
     script_say(lmp, "newton off");
     script_say(lmp, "communicate single vel yes");
     script_say(lmp, "processors 1 1 1");
@@ -331,7 +496,7 @@ void script_open(void *lmp, const dem_shared *s, const char *restart, int *plane
         script_say(lmp, "read_restart %s", restart);
     } else {
         script_say(lmp, "region box block %.17g %.17g %.17g %.17g %.17g %.17g units box", s->lo[0], s->hi[0], s->lo[1],
-                   s->hi[1], -s->period / 2, s->period / 2);
+                   s->hi[1], script_low(s), script_high(s));
         script_say(lmp, "create_box %d box", DEM_TYPE_DEAD);
     }
     // not `multi`: it finds no pairs at all in this LIGGGHTS
@@ -342,9 +507,11 @@ void script_open(void *lmp, const dem_shared *s, const char *restart, int *plane
     script_say(lmp, "neigh_modify exclude type %d %d", DEM_TYPE_FIXED_BODY, DEM_TYPE_FIXED_BODY);
     script_materials(lmp, s);
     script_say(lmp, "timestep %.17g", s->step);
-    double g = hypot(s->gravity[0], s->gravity[1]);
+    double g = s->dim == 3 ? sqrt(s->gravity[0] * s->gravity[0] + s->gravity[1] * s->gravity[1] + s->gravity[2] * s->gravity[2])
+                           : hypot(s->gravity[0], s->gravity[1]);
     if (g > 0)
-        script_say(lmp, "fix grav all gravity %.17g vector %.17g %.17g 0", g, s->gravity[0] / g, s->gravity[1] / g);
+        script_say(lmp, "fix grav all gravity %.17g vector %.17g %.17g %.17g", g, s->gravity[0] / g, s->gravity[1] / g,
+                   s->dim == 3 ? s->gravity[2] / g : 0);
     script_walls(lmp, s, plane);
     // the force on a sphere or, through one of its spheres, on a body; has to stand before the bodies
     script_say(lmp, "fix cfd all couple/cfd couple_every 0 mpi");
@@ -420,13 +587,17 @@ void script_add(void *lmp, const dem_shared *s, const char *path, int fd) {
     fprintf(file,
             "spheres\n\n%d atoms\n%d atom types\n%.17g %.17g xlo xhi\n%.17g %.17g ylo yhi\n%.17g %.17g zlo "
             "zhi\n\nAtoms\n\n",
-            s->n_add, DEM_TYPE_DEAD, s->lo[0], s->hi[0], s->lo[1], s->hi[1], -s->period / 2, s->period / 2);
+            s->n_add, DEM_TYPE_DEAD, s->lo[0], s->hi[0], s->lo[1], s->hi[1], script_low(s), script_high(s));
     for (const dem_add *a = add; a < add + s->n_add; a++)
-        fprintf(file, "%d %d %.17g %.17g %.17g %.17g 0\n", a->tag, a->type, 2 * a->radius, a->density, a->x[0],
-                a->x[1]);
+        fprintf(file, "%d %d %.17g %.17g %.17g %.17g %.17g\n", a->tag, a->type, 2 * a->radius, a->density, a->x[0], a->x[1],
+                s->dim == 3 ? a->x[2] : 0);
     fprintf(file, "\nVelocities\n\n");
     for (const dem_add *a = add; a < add + s->n_add; a++)
-        fprintf(file, "%d %.17g %.17g 0 0 0 %.17g\n", a->tag, a->v[0], a->v[1], a->omega[2]);
+        if (s->dim == 3)
+            fprintf(file, "%d %.17g %.17g %.17g %.17g %.17g %.17g\n", a->tag, a->v[0], a->v[1], a->v[2], a->omega[0], a->omega[1],
+                    a->omega[2]);
+        else
+            fprintf(file, "%d %.17g %.17g 0 0 0 %.17g\n", a->tag, a->v[0], a->v[1], a->omega[2]);
     script_file_close(file);
     script_say(lmp, "read_data %s add", path);
     script_groups(lmp);

@@ -9,7 +9,8 @@
 #include <stdbool.h>
 
 /** Box, materials, contact law, gravity, walls, fluid forces; from the restart file when shared->resume. plane[i] is
- * set to 1 when wall i became an infinite plane, 0 when it is a mesh, -1 when it lies outside the box. */
+ * set to 1 when wall i became an infinite plane, 0 when it is a mesh, -1 when it lies outside the box; triangles count on after
+ * the walls. */
 void script_open(void *lmp, const dem_shared *shared, const char *restart, int *plane);
 /** Templates of the free bodies and the integrator of spheres and bodies. @param file path of a scratch file, fd its
  * descriptor */

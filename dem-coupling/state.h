@@ -17,10 +17,10 @@ typedef struct coupling_grain {
     double x[3], v[3], omega[3];
     double radius, mass, solid; // m, kg/m, m3/m
     double diameter, number;    // for drag: m, grains per metre of width
-    double force[2];            // N/m, the water's
+    double force[3];            // N/m, the water's
     double torque[3];           // N m/m, the water's, where it is asked for
-    double contact[2], net;     // N/m, of the last step
-    double old_x[2], old_v[2];  // before the substeps
+    double contact[3], net;     // N/m, of the last step
+    double old_x[3], old_v[3];  // before the substeps
     int contacts;
     int near; // a node of the water next to it when it was last located, -1: none
     uint8_t on_bed;
@@ -51,15 +51,17 @@ struct silt_coupling {
     const silt_walls *walls; // borrowed
     silt_dem *dem;           // owned
     silt_dem_def dem_def;    // what it was opened with; its strings are borrowed
-    double (*wall)[4];       // owned, where LIGGGHTS has them
+    int dim;                 // of the scene
+    double (*wall)[4];       // owned, plane: where LIGGGHTS has them
+    double (*triangle)[10];  // owned, space: the same, see dem.h
     int *wall_motion;        // owned, per wall: which of the motions it follows, -1: none
     int n_motion;
     int *moving;             // owned, per motion: the scene's wall
-    double (*centre)[3];     // owned, per motion: where LIGGGHTS has it, m and rad
-    double (*towards)[3];    // owned, where it has it after the substeps
-    double (*pivot)[2];      // owned, centre without the angle
-    double (*rate)[3];       // owned, m/s and rad/s
-    double width;            // m, accounting width: spheres stand for what is in this width of the slab
+    double (*centre)[4];     // owned, per motion: where LIGGGHTS has it, m and rad
+    double (*towards)[4];    // owned, where it has it after the substeps
+    double (*pivot)[3];      // owned, centre without the angle
+    double (*rate)[4];       // owned, m/s and rad/s
+    double width;            // m, accounting width: spheres stand for what is in this width of the slab; 1 in space
     double step;             // s, of the discrete elements
     double parcel;           // m, usual radius of a parcel, 0 without bed
     double crust;            // m, radius of the frozen spheres along the bed
@@ -86,15 +88,15 @@ struct silt_coupling {
     double *torque;       // owned, 3 per grain, N m; NULL where the water exerts none
     silt_dem_sphere *add; // owned
     double elapsed;       // s, of the running substeps
-    double contact[2];    // N/m, of contacts on all grains, of the last substeps
+    double contact[3];    // N/m, of contacts on all grains, of the last substeps
     double left_mass;
     int64_t left_count;
     silt_error refused; // why a release cannot be; returned by the next start
 };
 
-/** grains.fixed holds the grain with this id: it is one of those of the start, which come first */
+/** the scene holds the grain with this id where it is: one of those of the start, whose ids come first */
 static inline bool coupling_fixes(const silt_coupling *c, int64_t id) {
-    return c->scene->grains.fixed && id <= silt_scene_grains(c->scene);
+    return id <= silt_scene_grains(c->scene) && silt_scene_grain(c->scene, (int)id - 1)->fixed;
 }
 
 /** mass of the sphere over the mass that it stands for in the slab: 1, more for a crumb; forces on it are scaled alike, so that it
@@ -106,6 +108,8 @@ double silt_coupling_burden(const silt_coupling *coupling, const coupling_grain 
 void silt_coupling_hold(silt_coupling *coupling, coupling_grain *grain);
 /** The water's torques on grains for the next substeps; nothing where grains.rotational_drag is off. */
 void silt_coupling_twist(silt_coupling *coupling);
+/** true when the way from a to b leads over an outlet out of the water, or a is within `near` of one */
+bool silt_coupling_leaves(const silt_coupling *coupling, const double *a, const double *b, double near);
 // walls.c
 void silt_coupling_walls(silt_coupling *coupling);       /**< which of them move, and where all are */
 void silt_coupling_walls_stand(silt_coupling *coupling); /**< where the walls are now is where LIGGGHTS has them */

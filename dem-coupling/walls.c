@@ -3,24 +3,35 @@
 
 #define WALL_GRAIN 0x1p-40 // m, that a wall's way in a substep is a multiple of
 
-void silt_coupling_walls_stand(silt_coupling *c) {
-    for (int i = 0; i < c->walls->count; i++)
+// the walls as the discrete elements take them, where they are now
+static void walls_take(const silt_coupling *c, double (*wall)[4], double (*triangle)[10]) {
+    const silt_walls *walls = c->walls;
+    for (int i = 0; i < walls->count && c->dim == 2; i++)
         for (int k = 0; k < 2; k++) {
-            c->wall[i][k] = c->walls->from[i][k];
-            c->wall[i][2 + k] = c->walls->to[i][k];
+            wall[i][k] = walls->from[i][k];
+            wall[i][2 + k] = walls->to[i][k];
         }
-    for (int m = 0; m < c->n_motion; m++)
-        for (int k = 0; k < 3; k++) {
-            c->centre[m][k] = c->towards[m][k];
-            if (k < 2)
-                c->pivot[m][k] = c->centre[m][k];
-        }
+    for (int i = 0; i < walls->count && c->dim == 3; i++) {
+        memcpy(triangle[i], walls->corner[i], sizeof walls->corner[i]);
+        triangle[i][9] = 0.0;
+        for (int k = 0; k < 3; k++)
+            triangle[i][9] += walls->joined[i][k] < 0 ? 1 << k : 0;
+    }
+}
+
+void silt_coupling_walls_stand(silt_coupling *c) {
+    walls_take(c, c->wall, c->triangle);
+    for (int m = 0; m < c->n_motion; m++) {
+        memcpy(c->centre[m], c->towards[m], sizeof *c->centre);
+        memcpy(c->pivot[m], c->centre[m], sizeof *c->pivot);
+    }
 }
 
 void silt_coupling_walls(silt_coupling *c) {
     const silt_walls *walls = c->walls;
     const size_t n = (size_t)walls->n_wall + 1;
     c->wall = silt_alloc((size_t)walls->count + 1, sizeof *c->wall);
+    c->triangle = silt_alloc((size_t)walls->count + 1, sizeof *c->triangle);
     c->wall_motion = silt_alloc((size_t)walls->count + 1, sizeof *c->wall_motion);
     c->moving = silt_alloc(n, sizeof *c->moving);
     c->centre = silt_alloc(n, sizeof *c->centre);
@@ -37,9 +48,9 @@ void silt_coupling_walls(silt_coupling *c) {
                 c->wall_motion[i] = c->n_motion;
         const silt_wall_motion *motion = &walls->motion[w];
         double *at = c->towards[c->n_motion];
-        for (int k = 0; k < 2; k++)
+        for (int k = 0; k < c->dim; k++)
             at[k] = WALL_GRAIN * rint(motion->centre[k] / WALL_GRAIN);
-        at[2] = motion->angle;
+        at[3] = motion->angle;
         c->moving[c->n_motion++] = w;
     }
     silt_coupling_walls_stand(c);
@@ -52,20 +63,18 @@ void silt_coupling_walls_go(silt_coupling *c, int n) {
         return;
     for (int m = 0; m < c->n_motion; m++) {
         const silt_wall_motion *motion = &c->walls->motion[c->moving[m]];
-        for (int k = 0; k < 2; k++) {
+        for (int k = 0; k < c->dim; k++) {
             const double way = WALL_GRAIN * rint((motion->centre[k] - c->centre[m][k]) / n / WALL_GRAIN);
             c->rate[m][k] = way / c->step;
             c->towards[m][k] = c->centre[m][k] + n * way;
         }
-        c->rate[m][2] = (motion->angle - c->centre[m][2]) / (n * c->step);
-        c->towards[m][2] = motion->angle;
+        c->rate[m][3] = (motion->angle - c->centre[m][3]) / (n * c->step);
+        c->towards[m][3] = motion->angle;
     }
     double(*wall)[4] = silt_alloc((size_t)c->walls->count + 1, sizeof *wall);
-    for (int i = 0; i < c->walls->count; i++)
-        for (int k = 0; k < 2; k++) {
-            wall[i][k] = c->walls->from[i][k];
-            wall[i][2 + k] = c->walls->to[i][k];
-        }
-    silt_dem_move_walls(c->dem, (const double(*)[3])c->rate, (const double(*)[4])wall);
+    double(*triangle)[10] = silt_alloc((size_t)c->walls->count + 1, sizeof *triangle);
+    walls_take(c, wall, triangle);
+    silt_dem_move_walls(c->dem, (const double(*)[4])c->rate, c->dim == 3 ? triangle[0] : wall[0]);
     free(wall);
+    free(triangle);
 }

@@ -33,7 +33,7 @@ static struct {
     pid_t parent;
     void *lmp;
     int scratch; // descriptor of a memory file for what LIGGGHTS reads
-    int *plane;  // owned, one per wall, see script_open
+    int *plane;  // owned, one per wall and triangle, see script_open
     int *row;    // owned, local index by tag, -1: not here
     int n_row;
     int *order; // owned, tags of the last answer
@@ -233,9 +233,9 @@ static void worker_flatten(const worker_atoms *a) {
 
 static void worker_check(const worker_atoms *a, const char *when) {
     for (int i = 0; i < a->n; i++)
-        if (!isfinite(a->x[i][0] + a->x[i][1] + a->v[i][0] + a->v[i][1] + a->omega[i][2]))
-            worker_fail("a sphere of type %d is not finite %s: x (%g, %g), v (%g, %g), omega %g", a->type[i], when,
-                        a->x[i][0], a->x[i][1], a->v[i][0], a->v[i][1], a->omega[i][2]);
+        if (!isfinite(a->x[i][0] + a->x[i][1] + a->x[i][2] + a->v[i][0] + a->v[i][1] + a->v[i][2] + a->omega[i][2]))
+            worker_fail("a sphere of type %d is not finite %s: x (%g, %g, %g), v (%g, %g, %g), omega_z %g", a->type[i], when, a->x[i][0],
+                        a->x[i][1], a->x[i][2], a->v[i][0], a->v[i][1], a->v[i][2], a->omega[i][2]);
 }
 
 // ---- the answer: state of grains and bodies
@@ -353,7 +353,7 @@ static void worker_open(void) {
     lammps_open(4, argument, MPI_COMM_WORLD, &worker.lmp);
     if (!worker.lmp)
         worker_fail("LIGGGHTS does not start");
-    worker.plane = worker_grow(worker.plane, (size_t)s->n_wall, sizeof *worker.plane);
+    worker.plane = worker_grow(worker.plane, (size_t)(s->n_wall + s->n_triangle), sizeof *worker.plane);
     script_open(worker.lmp, s, worker_path(DEM_FD_RESTART), worker.plane);
     if (s->resume) {
         worker_body_table();
@@ -397,26 +397,27 @@ static void worker_load(void) {
            **t = lammps_extract_fix(worker.lmp, "hdtorque", 1, 2, 0, 0);
 
     worker_index(&a);
-    worker_flatten(&a);
+    if (s->dim == 2)
+        worker_flatten(&a);
     worker_check(&a, "before the run");
     for (int i = 0; i < a.n; i++) {
-        for (int c = 0; c < 2; c++)
+        for (int c = 0; c < s->dim; c++)
             a.force[i][c] -= f[i][c];
-        if (a.type[i] == DEM_TYPE_GRAIN)
-            a.torque[i][2] -= t[i][2];
+        for (int c = s->dim == 3 ? 0 : 2; c < 3 && a.type[i] == DEM_TYPE_GRAIN; c++)
+            a.torque[i][c] -= t[i][c];
         memset(f[i], 0, 3 * sizeof(double)), memset(t[i], 0, 3 * sizeof(double));
     }
     for (int k = 0; k < s->n_force && k < worker.n_order; k++) {
         int i = worker_find(worker.order[k]);
         if (i >= 0 && a.type[i] == DEM_TYPE_GRAIN)
-            memcpy(f[i], &force[3 * k], 2 * sizeof(double));
-        if (i >= 0 && a.type[i] == DEM_TYPE_GRAIN && k < s->n_torque)
-            a.torque[i][2] += t[i][2] = torque[3 * k + 2];
+            memcpy(f[i], &force[3 * k], (size_t)s->dim * sizeof(double));
+        for (int c = s->dim == 3 ? 0 : 2; c < 3 && i >= 0 && a.type[i] == DEM_TYPE_GRAIN && k < s->n_torque; c++)
+            a.torque[i][c] += t[i][c] = torque[3 * k + c];
     }
     // a run that goes on begins with the sum of forces at the last one's end: the old load goes out of it, the new one comes in
     for (int i = 0; i < a.n; i++)
         if (a.type[i] == DEM_TYPE_GRAIN)
-            for (int c = 0; c < 2; c++)
+            for (int c = 0; c < s->dim; c++)
                 a.force[i][c] += f[i][c];
     // bodies stand where the last answer said
     for (int b = 0; b < worker.n_body; b++) {

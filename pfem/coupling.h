@@ -1,6 +1,6 @@
 /** @file coupling.h
  * The door between the time loop and the discrete elements. pfem/ knows this table only; dem-coupling/coupling.c fills it.
- * Everything on this side is per metre of width in 2-D; the coupling scales to real spheres and back.
+ * Everything on this side is per metre of width in 2-D; the coupling scales to real spheres and back. In 3-D spheres are what they are.
  */
 #ifndef SILT_COUPLING_H
 #define SILT_COUPLING_H
@@ -15,15 +15,15 @@ typedef struct silt_coupling_def {
     const silt_bed *bed;     // borrowed, NULL without bed
     const char *worker;      // path of silt-dem
     const char *log;         // OUT/dem.log
-    double lo[2], hi[2];     // the domain's box (with margin): what leaves it has left
+    double lo[3], hi[3];     // the domain's box (with margin): what leaves it has left
 } silt_coupling_def;
 
 /** what passed between grains, water and the rest in a step: N per m of width, mean over the step */
 typedef struct silt_exchanged {
-    double grains[2];  // the water's force on all grains, pressure gradient and drag
+    double grains[3];  // the water's force on all grains, pressure gradient and drag
     double size;       // the magnitudes of its parts, grain by grain: what an error of it is relative to
-    double water[2];   // the grains' drag on the water: sum over nodes of push - coefficient velocity
-    double contact[2]; // of all contacts on all grains; those of grains with each other cancel
+    double water[3];   // the grains' drag on the water: sum over nodes of push - coefficient velocity
+    double contact[3]; // of all contacts on all grains; those of grains with each other cancel
 } silt_exchanged;
 
 typedef struct silt_coupling_type {
@@ -52,7 +52,7 @@ typedef struct silt_coupling_type {
 
     /** true when a sphere fits there: overlap with grains, frozen spheres, bodies and walls at most 1 % of its radius.
      * Ask after bed_changed: the frozen spheres of a patch fill the place where its parcel goes. */
-    bool (*room)(const silt_coupling *coupling, const double x[2], double radius);
+    bool (*room)(const silt_coupling *coupling, const double *x, double radius);
     void (*release)(silt_coupling *coupling, int n, const silt_release *release); // queued
     void (*deposit)(silt_coupling *coupling, int grain);  // grain: index into grains(); becomes a frozen sphere, queued
     /** the bed's surface changed (bed->revision): the frozen spheres along it are brought up to date, queued */

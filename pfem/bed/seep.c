@@ -8,11 +8,7 @@
 #define SEEP_PASSES 3    // the same in a step
 #define SEEP_TINY 1e-9   // of the largest flow into a node: rounding, not a direction
 
-// the bed is plane so far; all that follows holds for tetrahedra too
-static int seep_dim(const silt_bed *bed) {
-    (void)bed;
-    return 2;
-}
+static int seep_dim(const silt_bed *bed) { return bed->dim == 3 ? 3 : 2; }
 
 static void cell_corner(const silt_bed *bed, int c, double *corner) {
     const int D = seep_dim(bed);

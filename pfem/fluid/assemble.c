@@ -218,6 +218,12 @@ void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_d
         BY_CELL(SUMS(1, f->withheld, f->residual), continuity, v, p, f->potential, f->share);
     else
         BY_CELL(SUMS(1, f->withheld, f->residual), continuity, v, p, NULL, NULL);
+    SILT_PARALLEL(f->n_node)
+    for (int j = 0; j < f->n_node; j++)
+        if (f->mobile[j] == MOBILE_SPRAY) { // its pressure is given: the smoothing's share is owed too
+            f->withheld[j] += f->residual[j];
+            f->residual[j] = 0;
+        }
 }
 
 KERNEL projection(const int D, const silt_fluid *f, const silt_mesh *mesh, int e, const silt_to to, const double *p, const double *potential) {

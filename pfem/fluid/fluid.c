@@ -525,11 +525,11 @@ static bool choose_theta(silt_fluid *f, const silt_step *s) {
     return f->theta > before;
 }
 
-// The momentum, or momentum and continuity as one system: once a step, the latter in every pass where viscosity changes in all of them.
-// Conjugate gradients make up for what the momentum's factor is behind.
+// The momentum, or momentum and continuity as one system, once a step: passes make up for what viscosity has changed by since (mud that
+// collapses, 13 passes with a factor for each, 12.5 with one).
 static silt_status factor_stiff(silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
     silt_status status;
-    if (silt_stiff_ready(f->stiff, pressure) && (!pressure || s->scene->fluid.rheology == RHEOLOGY_NEWTONIAN))
+    if (silt_stiff_ready(f->stiff, pressure))
         return SILT_OK;
     SILT_CLOCKED(matrix, status = silt_stiff_factor(&f->stiff, f, s, pressure, err));
     return status;
@@ -612,6 +612,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             if (def->scheme == SCHEME_FRACTIONAL)
                 SILT_TRY(explicit_limit(f, s, err));
             silt_mobile_find(f, s->mesh, p);
+            silt_spray_find(f, s, p);
             // in the plane a stiff cell here and there is no reason
             whole = direct && mean_stiffness(f, s) > FLUID_WHOLE;
             split = !direct && stiffness(f, s) > FLUID_STIFF;
@@ -648,8 +649,10 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         SILT_PARALLEL(f->n_node)
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
-        // on the way the momentum is solved no further than it is worth; the iterate that ends it is solved out
-        const double drop = def->scheme == SCHEME_IMPLICIT && before > 10 * strict * def->tolerance ? 1e-3 : 0;
+        // on the way the momentum is solved no further than it is worth: what refreshes are taken from farther; the iterate that ends
+        // it is solved out
+        const double worth = f->iterations == 0 ? 1e-5 : refresh ? 1e-3 : 1e-2;
+        const double drop = def->scheme == SCHEME_IMPLICIT && before > 10 * strict * def->tolerance ? worth : 0;
         bool solved;
         SILT_TRY(velocity_star(f, s, stiff > 0, drop, &solved, err));
         int worst_node = star_continuity(f, s, p);
@@ -762,10 +765,11 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         for (int i = 0; i < f->n_node; i++) {
             nodes->p[i] = p[i];
             f->solved_volume += f->residual[i] * s->dt;
-            nodes->debt[i] -= (f->rate[i] + (f->mobile[i] != 1 ? f->withheld[i] : 0)) * s->dt;
+            const double answered = (f->rate[i] + (f->mobile[i] != 1 ? f->withheld[i] : 0)) * s->dt;
+            nodes->debt[i] -= answered;
             if (def->pressure == PRESSURE_LAPLACIAN && s->mesh->surface[i]) // no continuity there: what the node gained
                 nodes->debt[i] -= f->residual[i] * s->dt;
-            f->given_back += f->rate[i] * s->dt;
+            f->given_back += answered;
             if (!s->mesh->wet[i])
                 continue;
             // what is held keeps its velocity, the rest goes on to the end of the step

@@ -16,6 +16,8 @@ typedef struct silt_pressure silt_pressure; // the pressure matrix and its facto
 typedef struct silt_stiff silt_stiff;       // factors of momentum and continuity where viscosity is stiff, stiff.c
 typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
 
+#define MOBILE_SPRAY 3 // silt_fluid.mobile: spray, at no pressure and without a say in its volume
+
 /** what a step sees */
 typedef struct silt_step {
     const silt_scene *scene;
@@ -59,7 +61,7 @@ typedef struct silt_fluid {
     double *projection, *projection_weight;    // owned, pressure gradient projection (dim per node) and its weight
     double *residual, *rate, *increment;       // owned, 1 per node
     uint8_t *hold;        // owned, silt_hold
-    uint8_t *mobile;      // owned, 1: some neighbour or the node itself can move; 2: but not so that its volume is kept
+    uint8_t *mobile;      // owned, 1: some neighbour or the node itself can move; 2: but not so that its volume is kept; MOBILE_SPRAY
     double *withheld;     // owned, per node, m3/s: gain that continuity does not see where mobile is not 1
     double *normal;       // owned, dim per node: silt_walls_hold's vector
     double *given;        // owned, dim per node, velocity of what is held
@@ -93,7 +95,7 @@ typedef struct silt_fluid {
     double projected;         // J, kinetic energy that making the first velocity free of divergence took
     double impulse[3];        // N s, what that gave to the water (of walls, bed, bodies)
     double solved_volume;     // m3, sum of residual times dt
-    double given_back;        // m3, volume that the debts asked for
+    double given_back;        // m3, volume that the debts asked for, or that is booked as one
     double momentum_residual; // N, unbalanced force on free nodes
     double momentum_scale;    // N, what it is relative to
 } silt_fluid;
@@ -187,6 +189,8 @@ void silt_debts_ask(silt_fluid *fluid, const silt_step *step);
 bool silt_debts_relent(silt_fluid *fluid);
 /** a node whose whole surroundings are held has no say in its volume, nor have films and crumbs with a free node or two */
 void silt_mobile_find(silt_fluid *fluid, const silt_mesh *mesh, double *p);
+/** spray on the free surface, whose pressure is nought: mobile becomes MOBILE_SPRAY; after silt_mobile_find */
+void silt_spray_find(silt_fluid *fluid, const silt_step *step, double *p);
 /** which nodes may be let off: between held ones; also where little is missing; all */
 typedef enum { POCKET_HELD = 0, POCKET_LITTLE, POCKET_ANY } silt_pocket;
 /** nodes that no velocity keeps at their volume take the pressure around them. @return whether there was any */

@@ -286,8 +286,8 @@ static silt_status frame_bed(const char *out, int number, const silt_view *view,
         offset[i + 1] = n_corner * (i + 1);
         type[i] = n_corner == 4 ? VTK_TETRA : VTK_TRIANGLE;
         density[i] = bed->mass[i] / bed->area[i];
-        for (int d = 0; d < 2 && seeps; d++)
-            darcy[3 * i + d] = bed->darcy[2 * i + d];
+        for (int d = 0; d < n_corner - 1 && seeps; d++)
+            darcy[3 * i + d] = bed->darcy[(n_corner - 1) * i + d];
     }
 
     frame_file f;

@@ -157,11 +157,12 @@ void silt_run_balance(silt_run *run) {
         return;
     silt_exchanged exchanged;
     silt_coupling_dem.exchanged(run->coupling, &exchanged);
-    for (int d = 0; d < 2; d++) {
+    double open[3] = {0};
+    for (int d = 0; d < 3; d++) {
+        open[d] = fluid->from_grains[d] + exchanged.grains[d];
         ledger->grain_water[d] = exchanged.grains[d];
         ledger->grain_contact[d] = exchanged.contact[d];
     }
-    const double open = hypot(fluid->from_grains[0] + exchanged.grains[0], fluid->from_grains[1] + exchanged.grains[1]);
     if (exchanged.size > 0)
-        ledger->momentum_error = silt_max(ledger->momentum_error, open / exchanged.size);
+        ledger->momentum_error = silt_max(ledger->momentum_error, silt_length(3, open) / exchanged.size);
 }

@@ -92,11 +92,11 @@ static void release_lifted(silt_run *run) {
         return;
     int lifted[RELEASE_MOST], n = 0;
     for (int k = 0; k < run->seep.n_node && n < RELEASE_MOST; k++) {
-        double normal[2];
+        double normal[3] = {0};
         if (!bed->alive[k] || !bed->exposed[k] || bed->seepage[k] < 1)
             continue;
         silt_bed_normal(bed, k, normal);
-        if (-(normal[0] * g[0] + normal[1] * g[1]) > RELEASE_LIFTS * size)
+        if (-silt_dot(3, normal, g) > RELEASE_LIFTS * size)
             lifted[n++] = k;
     }
     for (int k = 0; k < n; k++)

@@ -223,6 +223,7 @@ typedef struct silt_grain_def {
     double at[3], velocity[3];
     double diameter; // m
     double density;  // kg/m3
+    bool fixed;      // held where it is, default false
 } silt_grain_def;
 typedef enum { ARRANGE_RANDOM = 0, ARRANGE_LATTICE } silt_arrangement;
 /** a region full of grains at the start (fill.c) */
@@ -236,6 +237,7 @@ typedef struct silt_fill_def {
     int count;          // grains; 0: not given
     silt_arrangement arrangement;
     int seed;
+    bool fixed; // its grains are held where they are, default false
 } silt_fill_def;
 typedef struct silt_grains_def {
     bool on;              // true when the block is there; bodies alone need contact properties too: see contact
@@ -248,7 +250,6 @@ typedef struct silt_grains_def {
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false
     bool rotational_drag; // torque on the spin, default false
-    bool fixed;           // the grains of the start are held where they are, default false
     int n_grain;
     silt_grain_def *grain; // owned; key `list`
     int n_fill;

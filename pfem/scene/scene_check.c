@@ -15,11 +15,11 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     bool has_bodies = scene->n_body > 0;
     if (scene->dimension == 3) {
         // the others were refused already
-        grains = bodies = NULL;
+        bodies = NULL;
         if (!fluid)
             silt_complain(
                 reader, root,
-                "key 'fluid': found no water, allowed a scene with fluid: the rest is two-dimensional so far");
+                "key 'fluid': found no water, allowed a scene with fluid: in three dimensions grains come with water so far");
     } else if (!fluid && !grains && !has_bodies && !bodies)
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
@@ -480,69 +480,19 @@ typedef struct check_column {
 } check_column;
 
 // the same as in history.c; a test holds them together
-static const char *const check_fixed[] = {"step",
-                                          "time",
-                                          "dt",
-                                          "n_node",
-                                          "n_cell",
-                                          "fluid_volume",
-                                          "flying_volume",
-                                          "mesh_volume",
-                                          "fluid_mass",
-                                          "volume_error",
-                                          "kinetic_energy",
-                                          "potential_energy",
-                                          "momentum_x",
-                                          "momentum_y",
-                                          "momentum_z",
-                                          "momentum_error",
-                                          "external_work",
-                                          "dissipation",
-                                          "max_speed",
-                                          "volume_solved",
-                                          "volume_moved",
-                                          "volume_reconnected",
-                                          "volume_refined",
-                                          "volume_given",
-                                          "volume_owed",
-                                          "y_plus",
-                                          "angular_momentum_x",
-                                          "angular_momentum_y",
-                                          "angular_momentum_z",
-                                          "bed_mass",
-                                          "released_mass",
-                                          "deposited_mass",
-                                          "pore_water_mass",
-                                          "bed_shear",
-                                          "bed_work",
-                                          "bed_y_plus",
-                                          "seepage",
-                                          "seepage_volume",
-                                          "seepage_lost",
-                                          "grain_count",
-                                          "grain_mass",
-                                          "grain_velocity_x",
-                                          "grain_velocity_y",
-                                          "grain_velocity_z",
-                                          "grain_kinetic_energy",
-                                          "grain_potential_energy",
-                                          "grain_water_x",
-                                          "grain_water_y",
-                                          "grain_water_z",
-                                          "grain_contact_x",
-                                          "grain_contact_y",
-                                          "grain_contact_z",
-                                          "sediment_error",
-                                          "left_mass",
-                                          "inflow_mass",
-                                          "outflow_mass",
-                                          "wall_mesh",
-                                          "wall_assemble",
-                                          "wall_solve",
-                                          "wall_bed",
-                                          "wall_dem",
-                                          "wall_move",
-                                          "wall_output"};
+// clang-format off
+static const char *const check_fixed[] = {
+    "step", "time", "dt", "n_node", "n_cell", "fluid_volume", "flying_volume", "mesh_volume", "fluid_mass",
+    "volume_error", "kinetic_energy", "potential_energy", "momentum_x", "momentum_y", "momentum_z", "momentum_error",
+    "external_work", "dissipation", "max_speed", "volume_solved", "volume_moved", "volume_reconnected",
+    "volume_refined", "volume_given", "volume_owed", "y_plus", "angular_momentum_x", "angular_momentum_y",
+    "angular_momentum_z", "bed_mass", "released_mass", "deposited_mass", "pore_water_mass", "bed_shear", "bed_work",
+    "bed_y_plus", "seepage", "seepage_volume", "seepage_lost", "grain_count", "grain_mass", "grain_velocity_x",
+    "grain_velocity_y", "grain_velocity_z", "grain_kinetic_energy", "grain_potential_energy", "grain_water_x",
+    "grain_water_y", "grain_water_z", "grain_contact_x", "grain_contact_y", "grain_contact_z", "sediment_error",
+    "left_mass", "inflow_mass", "outflow_mass", "wall_mesh", "wall_assemble", "wall_solve", "wall_bed", "wall_dem",
+    "wall_move", "wall_output"};
+// clang-format on
 static const char *const check_of_body[] = {"x",  "y",  "z",  "vx", "vy", "vz", "qw", "qx", "qy", "qz", "wx",
                                             "wy", "wz", "fx", "fy", "fz", "tx", "ty", "tz", "cx", "cy", "cz"};
 enum {
