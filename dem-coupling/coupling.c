@@ -312,27 +312,35 @@ static double coupling_wall_distance(const silt_walls *walls, int i, const doubl
     return hypot(d[0] - t * e[0], d[1] - t * e[1]);
 }
 
+static double coupling_apart(const silt_coupling *c, const double *x, const double *y) {
+    const double flat = hypot(x[0] - y[0], x[1] - y[1]);
+    return c->dim == 3 ? hypot(flat, x[2] - y[2]) : flat;
+}
+
 // free distance from a point to grains and bodies
-static double coupling_gap(const void *context, const double x[2]) {
+static double coupling_gap(const void *context, const double *x) {
     const silt_coupling *c = context;
     double gap = HUGE_VAL;
     for (int i = 0; i < c->n_grain; i++)
         if (!c->grain[i].gone)
-            gap = silt_min(gap, hypot(x[0] - c->grain[i].x[0], x[1] - c->grain[i].x[1]) - c->grain[i].radius);
+            gap = silt_min(gap, coupling_apart(c, x, c->grain[i].x) - c->grain[i].radius);
     for (int i = 0; i < c->bodies->count; i++)
         gap = silt_min(gap, coupling_body_distance(c, i, x, gap));
     return gap;
 }
 
-static bool coupling_room(const silt_coupling *c, const double x[2], double radius) {
+static bool coupling_room(const silt_coupling *c, const double *x, double radius) {
     double need = (1.0 - room_overlap) * radius;
     if (coupling_gap(c, x) < need)
         return false;
     for (int i = 0; i < c->frozen.count; i++) {
         const silt_frozen_sphere *s = &c->frozen.sphere[i];
-        if (hypot(x[0] - s->x[0], x[1] - s->x[1]) - s->radius < need)
+        if (coupling_apart(c, x, s->x) - s->radius < need)
             return false;
     }
+    int element;
+    if (c->dim == 3)
+        return c->walls->count == 0 || silt_walls_distance(c->walls, x, &element) >= need;
     for (int i = 0; i < c->walls->count; i++)
         if (coupling_wall_distance(c->walls, i, x) < need)
             return false;
@@ -471,7 +479,7 @@ static void coupling_add(silt_coupling *c) {
                 continue;
             double density = c->scene->bed.on ? c->scene->bed.density : 1000.0;
             c->add[n++] = (silt_dem_sphere){
-                .id = f->id, .kind = DEM_FROZEN, .x = {f->x[0], f->x[1]}, .radius = f->radius, .density = density};
+                .id = f->id, .kind = DEM_FROZEN, .x = {f->x[0], f->x[1], f->x[2]}, .radius = f->radius, .density = density};
             f->sent = true;
         }
     }

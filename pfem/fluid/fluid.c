@@ -19,7 +19,7 @@
 
 void silt_fluid_clear(silt_fluid *f) {
     double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->start, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
-                       f->level_force, f->level_brake, f->mass, f->volume,
+                       f->level_force, f->bed_force, f->level_brake, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
                        f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->pressure_new, f->v_start, f->normal, f->given, f->cg[0],
                        f->cg[1]};
@@ -30,6 +30,7 @@ void silt_fluid_clear(silt_fluid *f) {
     free(f->closed);
     free(f->hold);
     free(f->mobile);
+    free(f->still);
     silt_pressure_free(&f->pressure);
     silt_stiff_free(&f->stiff);
     silt_mix_free(&f->mix);
@@ -200,6 +201,8 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
             out[k] += f->wall_force[k];
     for (int k = 0; f->level_force && k < D * f->n_node; k++)
         out[k] += f->level_force[k];
+    for (int k = 0; f->bed_force && k < D * f->n_node; k++)
+        out[k] += f->bed_force[k];
     if (s->scene->fluid.surface_tension > 0)
         silt_tension_force(s->mesh, f->x_mid, s->scene->fluid.surface_tension, out);
     if (s->pockets)
@@ -470,6 +473,8 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
     }
     f->momentum_residual = sqrt(square);
 
+    for (int k = 0; f->bed_force && k < D * f->n_node; k++)
+        out[k] += s->mesh->wet[k / D] ? f->bed_force[k] : 0;
     // the law of the wall brakes what is free
     for (int k = 0; k < f->law.n_point; k++) {
         const int i = f->law.point[k].node;
