@@ -134,11 +134,8 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     c->exchange.density = scene->fluid.density;
     c->exchange.viscosity = scene->fluid.viscosity;
     c->exchange.refresh = true;
-    c->exchange.force.def = (silt_force_def){.added_mass = grains->added_mass,
-                                             .theta = scene->fluid.theta,
-                                             .viscous = grains->viscous_force,
-                                             .lift = grains->lift == LIFT_SAFFMAN,
-                                             .spin = grains->rotational_drag};
+    c->exchange.force.def = (silt_force_def){grains->added_mass, scene->fluid.theta, grains->viscous_force,
+                                             grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     memcpy(c->exchange.gravity, scene->gravity, sizeof c->exchange.gravity);
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 

@@ -28,8 +28,7 @@ struct silt_dem {
     int n_remove, cap_remove, n_add, cap_add;
     int64_t *remove;      // owned
     silt_dem_sphere *add; // owned
-    int n_torque, cap_torque;
-    double *torque; // owned, of the next run
+    const double *torque; // borrowed, of the next run, NULL: none
     double (*rate)[4]; // owned, velocity and spin of every motion
     int n_solid, cap_solid, n_free, n_free_sphere;
     dem_solid *solid; // owned
@@ -71,7 +70,7 @@ void silt_dem_close(silt_dem **dem) {
     for (int k = 0; k < d->n_solid; k++)
         free((void *)d->solid[k].def.sphere);
     void *owned[] = {(void *)d->def.worker, (void *)d->def.log, (void *)d->def.wall, (void *)d->def.triangle, (void *)d->def.wall_motion,
-                     (void *)d->def.motion, d->rate, d->live, d->torque, d->remove, d->add, d->solid, d->id, d->x, d->v, d->omega,
+                     (void *)d->def.motion, d->rate, d->live, d->remove, d->add, d->solid, d->id, d->x, d->v, d->omega,
                      d->radius, d->mass, d->contacts, d->on_bed, d->body_x, d->body_v, d->body_omega, d->body_q};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
@@ -526,7 +525,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     s->n_remove = dem->n_remove;
     s->n_add = dem->n_add + n_fixed;
     s->n_force = force ? dem->state.n_grain : 0;
-    s->n_torque = dem->n_torque == dem->state.n_grain ? dem->n_torque : 0;
+    s->n_torque = dem->torque ? dem->state.n_grain : 0;
     s->max_grain = n_grain + dem->n_add;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
@@ -536,9 +535,9 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     // the layout may have moved: walls and bodies stand before what changes length
     if (force)
         memcpy(DEM_SECTION(s, double, force), force, 3 * (size_t)dem->state.n_grain * sizeof(double));
-    if (s->n_torque)
+    if (dem->torque)
         memcpy(DEM_SECTION(s, double, torque), dem->torque, 3 * (size_t)s->n_torque * sizeof(double));
-    dem->n_torque = 0;
+    dem->torque = NULL;
     for (int k = 0; k < dem->n_solid; k++) {
         if (dem->solid[k].slot < 0)
             continue;
@@ -551,11 +550,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     return dem_link_send(&dem->link, DEM_RUN, err);
 }
 
-void silt_dem_twist(silt_dem *dem, const double *torque) {
-    dem->n_torque = dem->state.n_grain;
-    SILT_RESERVE(dem->torque, dem->cap_torque, 3 * dem->n_torque + 3);
-    memcpy(dem->torque, torque, 3 * (size_t)dem->n_torque * sizeof *torque);
-}
+void silt_dem_twist(silt_dem *dem, const double *torque) { dem->torque = torque; }
 
 void silt_dem_keep(silt_dem *dem) {
     dem->keep = true;

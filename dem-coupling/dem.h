@@ -88,7 +88,7 @@ silt_status silt_dem_add_body(silt_dem *dem, const silt_dem_body *body, silt_err
  * springs) of the contacts out of its first half substep; see silt_dem_keep. */
 silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const double *body_force,
                            const double *body_torque, silt_error *err);
-/** Torques on the grains in the next run, 3 per grain in the order of the last state, N m; copied */
+/** Torques on the grains in the next run, 3 per grain in the order of the last state, N m; borrowed until then */
 void silt_dem_twist(silt_dem *dem, const double *torque);
 /** How the walls that move do so in the next runs, as stiff pieces: 4 numbers per motion, velocity in m/s and spin in rad/s, in the
  * plane from x to y, in space from x to z; and where they stand at the end of the next run, the numbers of the definition's walls or

@@ -403,7 +403,7 @@ static void worker_load(void) {
     for (int i = 0; i < a.n; i++) {
         for (int c = 0; c < s->dim; c++)
             a.force[i][c] -= f[i][c];
-        for (int c = s->dim == 3 ? 0 : 2; c < 3 && s->n_torque && a.type[i] == DEM_TYPE_GRAIN; c++)
+        for (int c = s->dim == 3 ? 0 : 2; c < 3 && a.type[i] == DEM_TYPE_GRAIN; c++)
             a.torque[i][c] -= t[i][c];
         memset(f[i], 0, 3 * sizeof(double)), memset(t[i], 0, 3 * sizeof(double));
     }

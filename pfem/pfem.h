@@ -271,8 +271,8 @@ typedef struct silt_barrier {
     const silt_bed *bed;             // NULL: none
     const struct silt_body_state *bodies; // NULL: none
 } silt_barrier;
-bool silt_barrier_contains(const silt_barrier *barrier, const double point[2]);
-bool silt_bed_contains(const silt_bed *bed, const double x[2]); // bed.c
+bool silt_barrier_contains(const silt_barrier *barrier, const double *point);
+bool silt_bed_contains(const silt_bed *bed, const double *x); // bed_mesh.c
 
 /** The first mesh: cells whose centroid lies in a region of the scene. */
 silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
@@ -330,26 +330,33 @@ typedef struct silt_drag {
 
 // ---------------------------------------------------------------- bed (bed.c)
 
-/** The bed: a mesh of bed material of its own. Nodes are never renumbered while they live; dead ones have alive = 0. */
+/** The bed: a mesh of bed material of its own. Nodes are never renumbered while they live; dead ones have alive = 0. In the plane
+ * the third coordinate is 0 and the last number of cells and edges -1. */
 struct silt_bed {
+    int dim;             // 2 or 3; 0 counts as 2
     int n_node, node_capacity;
-    double (*x)[2];      // owned, m
+    double (*x)[3];      // owned, m
     uint8_t *alive;      // owned, 1 while a bed cell holds the node
     uint8_t *exposed;    // owned, 1 when the node lies on the bed's surface (an edge of one bed cell only, not on a tank wall)
     double *work;        // owned, J/m3, frictional work since exposure (accumulator)
     double *eroded;      // owned, kg/m2, mass per area worn off since exposure (accumulator)
     double *shear;       // owned, Pa, bed shear stress of the last step
     int *fluid_node;     // owned, index of the NODE_BED in silt_nodes, -1 while not exposed
+    int (*wall)[3];      // owned, in space: elements of the walls that the node lies on, -1
+    int *corner;         // owned, in space: the element that owns a corner of the walls where the node is one, -1
     int n_cell, cell_capacity;
-    int (*cell)[3];      // owned, counter-clockwise
+    int (*cell)[4];      // owned, counter-clockwise triangles, or tetrahedra of positive volume
     double *mass;        // owned, kg per m of width, solid mass of the cell
-    double *area;        // owned, m2
+    double *area;        // owned, m2, in space m3
     int n_edge, edge_capacity;
-    int (*edge)[2];      // owned, exposed edges, the bed on the right, the water's side on the left
+    int (*edge)[3];      // owned, exposed edges, the bed on the right, the water's side on the left; in space faces,
+                         // counter-clockwise as the water sees them
+    const silt_walls *walls; // borrowed, what `wall` counts; NULL in the plane
     int64_t revision;    // rises when cells change
     double solid_mass;   // kg/m, sum of mass
     double initial_mass; // kg/m
     double pore_water;   // kg/m, released to the water since the start less taken up
+    double y_plus;       // of the first cell on the bed in the last step, the largest; 0: the law takes no gradient
     struct silt_bed_index *index; // owned, cells by node and by place (bed_mesh.h); every change keeps it up to date
 };
 
@@ -397,10 +404,12 @@ typedef struct silt_ledger {
     double inflow_mass, outflow_mass;             // water, cumulative, kg
     double pore_water_mass;                       // released less taken up, cumulative, kg
     double bed_mass, released_mass, deposited_mass, left_mass;      // sediment, cumulative, kg
+    double bed_shear, bed_work, bed_y_plus;       // Pa, J/m3, largest on the bed's surface; see bed.y_plus
     double initial_sediment;
     int grain_count;
     double grain_mass, sediment_error;
     double grain_velocity[3];                     // m/s, mean by mass
+    double grain_kinetic, grain_potential;        // J/m, with the spin's; against the height 0
     double grain_water[3], grain_contact[3];      // N/m, force of the water and of contacts on all grains, mean of the last step
     double external_work, dissipation;            // J/m, cumulative
     double max_speed;                             // m/s, of the water's nodes

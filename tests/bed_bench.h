@@ -39,6 +39,8 @@ static inline void bench_open(bench *b, double size) {
     b->scene.dimension = 2;
     b->scene.fluid = (silt_fluid_def){.on = true, .density = 1000, .viscosity = 1e-3, .size = size};
     b->scene.bed = (silt_bed_def){.on = true,
+                                  .law = BED_FRICTIONAL_WORK,
+                                  .shear = SHEAR_PAPER,
                                   .density = 2650,
                                   .porosity = 0.4,
                                   .work = 100,
@@ -78,7 +80,7 @@ static inline void bench_wall(bench *b, int n, const double *xy) {
 
 static inline void bench_create(bench *b) {
     silt_error err = {0};
-    if (silt_bed_create(&b->bed, &b->scene, &err) != SILT_OK)
+    if (silt_bed_create(&b->bed, &b->scene, NULL, &err) != SILT_OK)
         fail_msg("%s", err.text);
 }
 
@@ -105,7 +107,7 @@ static inline void bench_water(bench *b, double x0, double y0, double x1, double
 }
 
 static inline void bench_wear(bench *b, double dt) {
-    silt_bed_wear(&b->bed, &b->scene, &b->nodes, &b->mesh, &b->locator, dt);
+    silt_bed_wear(&b->bed, &b->scene, &b->nodes, &b->mesh, &b->locator, NULL, dt);
 }
 
 // ---------------------------------------------------------------- what always holds

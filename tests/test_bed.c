@@ -49,9 +49,9 @@ static void test_create_box(void **state) {
             NEAR(n[0], 0, 1e-12);
             NEAR(n[1], 1, 1e-12);
         }
-    NEAR(silt_bed_level(&b.bed, 0.4321), 0.3, 1e-15);
-    NEAR(silt_bed_level(&b.bed, 0), 0.3, 1e-15);
-    assert_true(silt_bed_level(&b.bed, 1.01) == -HUGE_VAL);
+    NEAR(silt_bed_level(&b.bed, (double[]){0.4321}), 0.3, 1e-15);
+    NEAR(silt_bed_level(&b.bed, (double[]){0}), 0.3, 1e-15);
+    assert_true(silt_bed_level(&b.bed, (double[]){1.01}) == -HUGE_VAL);
     bench_close(&b);
 }
 
@@ -76,7 +76,7 @@ static void test_create_touching(void **state) {
     bench_polygon(&b, 3, (double[]){0.31, 0.2, 0.77, 0.2, 0.5, 0.41});
     check_created(&b, 0.2 + 0.5 * 0.46 * 0.21);
     NEAR(surface_length(&b.bed), 1 + 0.4 + 0.54 + hypot(0.19, 0.21) + hypot(0.27, 0.21), 1e-12);
-    NEAR(silt_bed_level(&b.bed, 0.5), 0.41, 1e-15);
+    NEAR(silt_bed_level(&b.bed, (double[]){0.5}), 0.41, 1e-15);
     bench_close(&b);
 
     // two that overlap are one: area of the union
@@ -96,7 +96,7 @@ static void test_create_touching(void **state) {
     // nothing there: refused with the scene's name and the key
     bench_open(&b, 0.04);
     silt_error err = {0};
-    assert_int_equal(silt_bed_create(&b.bed, &b.scene, &err), SILT_INPUT);
+    assert_int_equal(silt_bed_create(&b.bed, &b.scene, NULL, &err), SILT_INPUT);
     assert_non_null(strstr(err.text, "bench"));
     assert_non_null(strstr(err.text, "bed.regions"));
     bench_close(&b);
@@ -190,6 +190,7 @@ static void test_onset_dissipation(void **state) {
     bench b;
     bench_flat(&b, 0.05, 0.01, 1);
     b.scene.bed.law = BED_DISSIPATION;
+    b.scene.bed.shear = SHEAR_GRADIENT;
     for (int k = 0; k < b.nodes.count; k++)
         if (b.nodes.x[2 * k + 1] < 0.1 + 1e-9)
             b.nodes.v[2 * k] = 0;
@@ -202,6 +203,7 @@ static void test_onset_dissipation(void **state) {
     // water that turns like a solid does no work
     bench_flat(&b, 0.05, 0.01, 0);
     b.scene.bed.law = BED_DISSIPATION;
+    b.scene.bed.shear = SHEAR_GRADIENT;
     for (int k = 0; k < b.nodes.count; k++) {
         b.nodes.v[2 * k] = -3 * (b.nodes.x[2 * k + 1] - 0.1);
         b.nodes.v[2 * k + 1] = 3 * b.nodes.x[2 * k];

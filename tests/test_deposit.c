@@ -13,7 +13,7 @@ static void drop_parcels(bench *b, int n, double lo, double hi, double r, double
     double taken = 0;
     for (int k = 0; k < n; k++) {
         const double x = lo + (hi - lo) * silt_uniform(&seed);
-        const double at[2] = {x, silt_bed_level(&b->bed, x) + r + 0.3 * b->scene.bed.size * silt_uniform(&seed)};
+        const double at[2] = {x, silt_bed_level(&b->bed, (double[]){x}) + r + 0.3 * b->scene.bed.size * silt_uniform(&seed)};
         const double solid = b->bed.solid_mass, pores = b->bed.pore_water, area = bed_area(&b->bed);
         const int64_t revision = b->bed.revision;
         silt_deposit deposit = {0};
@@ -123,7 +123,7 @@ static void test_deposit_erode_mixed(void **state) {
         for (int k = 0; k < 12 && outside >= parcel; k++) {
             const double x = silt_uniform(&seed), up = 0.5 * d + 0.3 * 0.05 * silt_uniform(&seed);
             silt_deposit deposit = {0};
-            const double level = silt_bed_level(&b.bed, x);
+            const double level = silt_bed_level(&b.bed, (double[]){x});
             if (level > 0 && silt_bed_deposit(&b.bed, &b.scene, (double[2]){x, level + up}, 0.5 * d, parcel, &deposit))
                 outside -= parcel;
             count[deposit.kind]++;
@@ -174,7 +174,7 @@ static void bench_step(bench *b, uint64_t *seed) {
         silt_bed_patch(&b->bed, node[k], &patch);
         silt_bed_release(&b->bed, &b->scene, &patch);
     }
-    const double x = silt_uniform(seed), level = silt_bed_level(&b->bed, x);
+    const double x = silt_uniform(seed), level = silt_bed_level(&b->bed, (double[]){x});
     silt_deposit deposit = {0};
     if (level > 0)
         silt_bed_deposit(&b->bed, &b->scene, (double[2]){x, level + 0.02}, 0.0075, 0.3, &deposit);
@@ -203,7 +203,7 @@ static void test_save_load(void **state) {
             fail_msg("%s", err.text);
         silt_store_close(&store);
         silt_bed loaded = {0};
-        if (silt_store_open(&store, path, &err) || silt_bed_load(&loaded, store, &err))
+        if (silt_store_open(&store, path, &err) || silt_bed_load(&loaded, NULL, store, &err))
             fail_msg("%s", err.text);
         silt_store_close(&store);
         same_bits(&b.bed, &loaded);

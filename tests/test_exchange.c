@@ -760,8 +760,8 @@ typedef struct bench {
     silt_scene scene;
     silt_walls walls;
     silt_bed bed;
-    double x[11][2];
-    int edge[10][2];
+    double x[11][3];
+    int edge[10][3];
     silt_coupling_def def;
     silt_coupling *coupling;
 } bench;
@@ -798,6 +798,7 @@ static void bench_init(bench *b, bool bed) {
     for (int i = 0; i < 10; i++) {
         b->edge[i][0] = i;
         b->edge[i][1] = i + 1;
+        b->edge[i][2] = -1;
     }
     b->def.bed = &b->bed;
 }

@@ -13,10 +13,10 @@ static double square_v[2 * SQUARE_NODES], square_p[SQUARE_NODES], square_solid[S
 static int64_t square_id[SQUARE_NODES] = {10, 11, 12, 13, 14, 15, 16, 17};
 static uint8_t square_kind[SQUARE_NODES] = {NODE_CORNER, NODE_CORNER}, square_wet[] = {1, 1, 1, 1, 1, 1, 1, 0};
 
-static double bed_x[][2] = {{0, -1}, {1, -0.5}, {2, -1}, {9, 9}};
+static double bed_x[][3] = {{0, -1, 0}, {1, -0.5, 0}, {2, -1, 0}, {9, 9, 0}};
 static uint8_t bed_alive[] = {1, 1, 1, 0};
 static double bed_work[] = {1, 2, 3, 4}, bed_shear[] = {5, 6, 7, 8};
-static int bed_cell[][3] = {{0, 2, 1}}, bed_edge[][2] = {{0, 1}, {1, 2}};
+static int bed_cell[][4] = {{0, 2, 1, -1}}, bed_edge[][3] = {{0, 1, -1}, {1, 2, -1}};
 static double bed_mass[] = {795}, bed_area[] = {0.5};
 
 static int64_t grain_id[] = {3, 7};
@@ -272,7 +272,7 @@ static void test_gauges(void **state) {
     "volume_moved,volume_reconnected,volume_refined,volume_given,volume_owed,angular_momentum_x,"                      \
     "angular_momentum_y,angular_momentum_z,"
 #define GRAIN_FORCES                                                                                                   \
-    "grain_velocity_x,grain_velocity_y,grain_velocity_z,grain_water_x,grain_water_y,grain_water_z,grain_contact_x,"    \
+    "grain_velocity_x,grain_velocity_y,grain_velocity_z,grain_kinetic_energy,grain_potential_energy,grain_water_x,grain_water_y,grain_water_z,grain_contact_x,"    \
     "grain_contact_y,grain_contact_z,"
 
 static void test_history_columns(void **state) {
@@ -294,7 +294,7 @@ static void test_history_columns(void **state) {
     assert_int_equal(silt_history_create(&history, folder, &w.scene, &err), SILT_OK);
     assert_int_equal(silt_history_close(&history, &err), SILT_OK);
     assert_string_equal(content("history.csv"),
-                        WATER "bed_mass,released_mass,deposited_mass,pore_water_mass,grain_count,grain_mass," GRAIN_FORCES
+                        WATER "bed_mass,released_mass,deposited_mass,pore_water_mass,bed_shear,bed_work,bed_y_plus,grain_count,grain_mass," GRAIN_FORCES
                               "sediment_error,left_mass,inflow_mass,outflow_mass,block_x,block_y,block_z,block_vx,"
                               "block_vy,block_vz,block_qw,block_qx,block_qy,block_qz,block_wx,block_wy,block_wz,"
                               "block_fx,block_fy,block_fz,block_tx,block_ty,block_tz,block_cx,block_cy,block_cz,"

@@ -10,21 +10,24 @@ void silt_bed_patch(const silt_bed *bed, int node, silt_patch *patch) {
     if (!bed->alive[node])
         return;
     // rising cell numbers: sums have the same bits after a restart
-    for (int place = bed->index->first[node]; place >= 0 && patch->n_cell < 32; place = bed->index->next[place]) {
+    for (int place = bed->index->first[node]; place >= 0 && patch->n_cell < PATCH_CELLS; place = bed->index->next[place]) {
         int k = patch->n_cell++;
-        for (; k > 0 && patch->cell[k - 1] > place / 3; k--)
+        for (; k > 0 && patch->cell[k - 1] > place / 4; k--)
             patch->cell[k] = patch->cell[k - 1];
-        patch->cell[k] = place / 3;
+        patch->cell[k] = place / 4;
     }
     for (int k = 0; k < patch->n_cell; k++) {
         const int c = patch->cell[k];
         patch->mass += bed->mass[c];
         patch->area += bed->area[c];
-        for (int d = 0; d < 2; d++)
-            patch->centre[d] += bed->area[c] / 3 *
-                                (bed->x[bed->cell[c][0]][d] + bed->x[bed->cell[c][1]][d] + bed->x[bed->cell[c][2]][d]);
+        for (int d = 0; d < 3; d++) {
+            double sum = bed->x[bed->cell[c][0]][d] + bed->x[bed->cell[c][1]][d] + bed->x[bed->cell[c][2]][d];
+            if (bed_dim(bed) == 3)
+                sum += bed->x[bed->cell[c][3]][d];
+            patch->centre[d] += bed->area[c] / (bed_dim(bed) + 1) * sum;
+        }
     }
-    for (int d = 0; d < 2; d++)
+    for (int d = 0; d < 3; d++)
         patch->centre[d] /= patch->area;
     silt_bed_normal(bed, node, patch->normal);
     const double length = bed->index->length[node];
@@ -40,17 +43,20 @@ void silt_bed_release(silt_bed *bed, const silt_scene *scene, const silt_patch *
     silt_bed_heirs_take(&heirs, bed, scene, patch);
 
     // the patch's own edges: those on the surface go, those towards the rest of the bed come
-    int ring[32][3], n_ring = patch->n_cell;
+    const int dim = bed_dim(bed), n_ring = patch->n_cell;
+    int ring[PATCH_CELLS][4];
     for (int k = 0; k < n_ring; k++)
         memcpy(ring[k], bed->cell[patch->cell[k]], sizeof ring[k]);
     for (int k = n_ring - 1; k >= 0; k--)
         silt_bed_cell_remove(bed, patch->cell[k]);
     for (int k = 0; k < n_ring; k++)
-        for (int a = 0; a < 3; a++) {
-            const int from = ring[k][a], to = ring[k][(a + 1) % 3];
-            silt_bed_edge_remove(bed, to, from);
-            if (silt_bed_cell_at(bed, to, from) >= 0)
-                silt_bed_edge_add(bed, scene, from, to);
+        for (int a = 0; a <= dim; a++) {
+            int facet[3], turned[3];
+            bed_facet(dim, ring[k], a, facet);
+            bed_facet_turned(facet, turned);
+            silt_bed_edge_remove(bed, facet);
+            if (silt_bed_cell_at(bed, turned) >= 0)
+                silt_bed_edge_add(bed, scene, turned);
         }
     silt_bed_refresh(bed);
     bed->pore_water += scene->bed.saturation * (patch->area - patch->mass / scene->bed.density) * scene->fluid.density;
@@ -70,28 +76,34 @@ int silt_bed_loose(const silt_bed *bed, const silt_scene *scene, int capacity, i
         return 0;
     // pieces: cells joined through edges; held when one of their edges lies on a wall
     const size_t n_cell = (size_t)bed->n_cell;
+    const int dim = bed_dim(bed);
     int *root = silt_alloc(n_cell, sizeof *root);
     double *area = silt_alloc(n_cell, sizeof *area);
     uint8_t *held = silt_alloc(n_cell, 1), *covered = silt_alloc(n_cell, 1);
     for (int c = 0; c < bed->n_cell; c++)
         root[c] = c;
     for (int c = 0; c < bed->n_cell; c++)
-        for (int a = 0; a < 3; a++) {
-            const int across = silt_bed_cell_at(bed, bed->cell[c][(a + 1) % 3], bed->cell[c][a]);
+        for (int a = 0; a <= dim; a++) {
+            int facet[3], turned[3];
+            bed_facet(dim, bed->cell[c], a, facet);
+            bed_facet_turned(facet, turned);
+            const int across = silt_bed_cell_at(bed, turned);
             const int p = piece_root(root, c), q = across >= 0 ? piece_root(root, across) : p;
             root[p > q ? p : q] = p > q ? q : p;
         }
     for (int c = 0; c < bed->n_cell; c++) {
         const int p = piece_root(root, c);
         area[p] += bed->area[c];
-        for (int a = 0; a < 3 && !held[p]; a++) {
-            const int from = bed->cell[c][a], to = bed->cell[c][(a + 1) % 3];
-            held[p] = silt_bed_cell_at(bed, to, from) < 0 && silt_bed_on_wall(scene, bed->x[from], bed->x[to]);
+        for (int a = 0; a <= dim && !held[p]; a++) {
+            int facet[3], turned[3];
+            bed_facet(dim, bed->cell[c], a, facet);
+            bed_facet_turned(facet, turned);
+            held[p] = silt_bed_cell_at(bed, turned) < 0 && silt_bed_on_wall(bed, scene, facet);
         }
     }
 
     // nodes whose patches cover the loose cells, those first that take nothing else along
-    const double small = 10 * 3 * sqrt(3.0) / 4 * silt_square(bed_size(scene));
+    const double size = bed_size(scene), small = dim == 3 ? 10 * 1.25 * size * size * size : 10 * 3 * sqrt(3.0) / 4 * silt_square(size);
     int n = 0;
     for (int pass = 0; pass < 2; pass++)
         for (int c = 0; c < bed->n_cell && n < capacity; c++) {
@@ -99,12 +111,12 @@ int silt_bed_loose(const silt_bed *bed, const silt_scene *scene, int capacity, i
             if (held[p] || area[p] >= small || covered[c])
                 continue;
             int best = -1, most = 0;
-            for (int a = 0; a < 3; a++) {
+            for (int a = 0; a <= dim; a++) {
                 const int k = bed->cell[c][a];
                 int own = 0, other = 0;
                 for (int place = bed->index->first[k]; place >= 0; place = bed->index->next[place]) {
-                    own += piece_root(root, place / 3) == p && !covered[place / 3];
-                    other += piece_root(root, place / 3) != p;
+                    own += piece_root(root, place / 4) == p && !covered[place / 4];
+                    other += piece_root(root, place / 4) != p;
                 }
                 if (bed->exposed[k] && own > most && (pass == 1 || other == 0)) {
                     best = k;
@@ -115,7 +127,7 @@ int silt_bed_loose(const silt_bed *bed, const silt_scene *scene, int capacity, i
                 continue;
             node[n++] = best;
             for (int place = bed->index->first[best]; place >= 0; place = bed->index->next[place])
-                covered[place / 3] = 1;
+                covered[place / 4] = 1;
         }
     free(root);
     free(area);

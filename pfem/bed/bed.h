@@ -6,17 +6,21 @@
 
 #include "pfem.h"
 
+enum { PATCH_CELLS = 128 };
+
 /** what a bed node takes along when it is released: all bed cells around it */
 typedef struct silt_patch {
     int node;
-    double centre[2]; // centroid of the patch, m
-    double normal[2]; // unit, out of the bed at the node
-    double mass;      // kg/m, solid
-    double area;      // m2
+    double centre[3]; // centroid of the patch, m
+    double normal[3]; // unit, out of the bed at the node
+    double mass;      // kg/m, in space kg, solid
+    double area;      // m2, in space m3
     double height;    // m, area over exposed length at the node (half of its exposed edges'); 0 while not exposed
     int n_cell;
-    int cell[32];     // bed cells
+    int cell[PATCH_CELLS]; // bed cells
 } silt_patch;
+
+enum { DEPOSIT_CELLS = 32 };
 
 typedef enum {
     DEPOSIT_REFUSED = 0, // too far from the bed, or no sound place
@@ -27,16 +31,19 @@ typedef struct silt_deposit {
     silt_deposit_kind kind;
     int node;          // the new bed node, or -1
     int n_cell;
-    int cell[8];       // the new cells
-    double area;       // m2, of the new cells
+    int cell[DEPOSIT_CELLS]; // the new cells
+    double area;       // m2, in space m3, of the new cells
     double pore_water; // kg/m, water taken out of the flow by the new pores (negative: displaced out of pores)
 } silt_deposit;
 
-/** Fills the bed's regions with nodes at spacing bed.size and triangles between them. fluid_density is for pore water. */
-silt_status silt_bed_create(silt_bed *bed, const silt_scene *scene, silt_error *err);
+/** Fills the bed's regions with nodes at spacing bed.size and cells between them.
+ * @param walls  borrowed while the bed lives; may be NULL in the plane */
+silt_status silt_bed_create(silt_bed *bed, const silt_scene *scene, const silt_walls *walls, silt_error *err);
 void silt_bed_clear(silt_bed *bed);
-/** unit normal out of the bed at an exposed node, from its exposed edges */
-void silt_bed_normal(const silt_bed *bed, int node, double normal[2]);
+/** unit normal out of the bed at an exposed node, from its exposed edges: as many numbers as dimensions */
+void silt_bed_normal(const silt_bed *bed, int node, double *normal);
+/** normal of an exposed edge or face out of the bed, as long as the edge, in space the face's area */
+void silt_bed_facet_normal(const silt_bed *bed, const int facet[3], double *normal);
 void silt_bed_patch(const silt_bed *bed, int node, silt_patch *patch);
 /** Takes the patch out of the bed: its cells vanish, nodes without cells die (their fluid_node stays for the caller to read),
  * newly exposed ones start with the excess over W_c, shared over their lengths of surface, at most one layer. The pore water
@@ -49,12 +56,15 @@ int silt_bed_loose(const silt_bed *bed, const silt_scene *scene, int capacity, i
 /** Puts a parcel's solid mass (kg/m) at x (radius r) back on the bed. The new node is at x; up to r higher where that would
  * leave the mass too little room; on a wall that is nearer than half a spacing and where the surface ends. deposit->cell
  * holds until the next change. @return also in deposit->kind */
-silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const double x[2], double r, double mass,
+silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass,
                                    silt_deposit *deposit);
-bool silt_bed_contains(const silt_bed *bed, const double x[2]);
-/** height of the bed's surface at abscissa x, or -HUGE_VAL where there is none */
-double silt_bed_level(const silt_bed *bed, double x);
+bool silt_bed_contains(const silt_bed *bed, const double *x);
+/** true when an exposed node lies nearer than reach */
+bool silt_bed_near(const silt_bed *bed, const double *x, double reach);
+/** height of the bed's surface at x, in space at (x, y), or -HUGE_VAL where there is none */
+double silt_bed_level(const silt_bed *bed, const double *at);
 silt_status silt_bed_save(const silt_bed *bed, silt_store *store, silt_error *err);
-silt_status silt_bed_load(silt_bed *bed, silt_store *store, silt_error *err);
+/** @param walls  as for silt_bed_create */
+silt_status silt_bed_load(silt_bed *bed, const silt_walls *walls, silt_store *store, silt_error *err);
 
 #endif

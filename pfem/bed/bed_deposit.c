@@ -1,5 +1,6 @@
 // deposition: a parcel at rest gives its mass back, as a cell between it and the surface or into the pores of one there
 
+#include "bed_grow.h"
 #include "bed_mesh.h"
 
 enum { CHAIN = 7 }; // most nodes of the surface that one new node is joined to
@@ -172,33 +173,26 @@ static void growth_commit(silt_bed *bed, const silt_scene *scene, const bed_grow
     double left = mass;
     for (int k = 0; k + 1 < growth->n; k++) {
         const int a = growth->node[k], b = growth->node[k + 1];
-        const int cell = silt_bed_cell_add(bed, a, b, deposit->node, 0);
+        const int cell = silt_bed_cell_add(bed, (int[3]){a, b, deposit->node}, 0);
         // shared by area; the last cell takes what rounding left
         bed->mass[cell] = k + 2 < growth->n ? mass * (bed->area[cell] / growth->area) : left;
         left -= bed->mass[cell];
         deposit->cell[deposit->n_cell++] = cell;
-        silt_bed_edge_remove(bed, a, b);
+        silt_bed_edge_remove(bed, (int[3]){a, b, -1});
     }
-    silt_bed_edge_add(bed, scene, growth->node[0], deposit->node);
-    silt_bed_edge_add(bed, scene, deposit->node, growth->node[growth->n - 1]);
+    silt_bed_edge_add(bed, scene, (int[3]){growth->node[0], deposit->node, -1});
+    silt_bed_edge_add(bed, scene, (int[3]){deposit->node, growth->node[growth->n - 1], -1});
     silt_bed_refresh(bed);
     // what lies under the new cells is surface no more
     for (int k = 0; k < growth->n; k++)
         if (!bed->exposed[growth->node[k]])
             bed->work[growth->node[k]] = bed->eroded[growth->node[k]] = bed->shear[growth->node[k]] = 0;
-    deposit->kind = DEPOSIT_CELL;
     deposit->area = growth->area;
-    deposit->pore_water = scene->bed.saturation * (growth->area - mass / scene->bed.density) * scene->fluid.density;
-    bed->pore_water -= deposit->pore_water;
 }
 
-silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const double x[2], double r, double mass,
-                                   silt_deposit *deposit) {
-    *deposit = (silt_deposit){.kind = DEPOSIT_REFUSED, .node = -1};
-    if (!(mass > 0) || bed->n_edge == 0)
-        return deposit->kind;
-
-    // the nearest edge with x on the water's side; at a convex node two edges are equally near
+// The edge nearest to x with x on the water's side, and cells over it. @return the edge, -1: none within reach
+static int deposit_plane(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass, silt_deposit *deposit) {
+    // at a convex node two edges are equally near
     const double reach = r + 0.35 * bed_size(scene), tie = 0.01 * bed_size(scene);
     double nearest = reach;
     int below = -1;
@@ -211,8 +205,7 @@ silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const
         }
     }
     if (below < 0 || silt_bed_contains(bed, x))
-        return deposit->kind;
-
+        return -1;
     bed_growth growth;
     for (int pass = 0; pass < 2; pass++)
         for (int e = 0; e < bed->n_edge; e++) {
@@ -223,12 +216,47 @@ silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const
             for (int lift = 0; lift <= 4; lift++)
                 if (growth_try(bed, scene, e, x, 0.25 * lift * r, mass, &growth)) {
                     growth_commit(bed, scene, &growth, mass, deposit);
-                    return deposit->kind;
+                    return below;
                 }
         }
+    return below;
+}
+
+// the same with faces; where few of them leave the mass too little room, the notches beside the new cells are filled up
+static int deposit_space(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass, silt_deposit *deposit) {
+    static const double notch[] = {100, 140, 170};
+    double distance;
+    const int below = silt_bed_face_below(bed, x, r + 0.35 * bed_size(scene), &distance);
+    if (below < 0 || silt_bed_contains(bed, x))
+        return -1;
+    bed_growth3 growth;
+    for (int width = 0; width < 3; width++)
+        for (int lift = 0; lift <= 4; lift++)
+            if (silt_bed_grow_try(bed, scene, below, x, 0.25 * lift * r, notch[width] * M_PI / 180, mass, &growth)) {
+                silt_bed_grow(bed, scene, &growth, mass, deposit);
+                deposit->area = growth.volume;
+                return below;
+            }
+    return below;
+}
+
+silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass,
+                                   silt_deposit *deposit) {
+    *deposit = (silt_deposit){.kind = DEPOSIT_REFUSED, .node = -1};
+    if (!(mass > 0) || bed->n_edge == 0)
+        return deposit->kind;
+    const int below = (bed_dim(bed) == 3 ? deposit_space : deposit_plane)(bed, scene, x, r, mass, deposit);
+    if (below < 0)
+        return deposit->kind;
+    if (deposit->n_cell > 0) {
+        deposit->kind = DEPOSIT_CELL;
+        deposit->pore_water = scene->bed.saturation * (deposit->area - mass / scene->bed.density) * scene->fluid.density;
+        bed->pore_water -= deposit->pore_water;
+        return deposit->kind;
+    }
 
     // no room for a cell: into the pores of the one under the edge
-    const int cell = silt_bed_cell_at(bed, bed->edge[below][1], bed->edge[below][0]);
+    const int cell = silt_bed_cell_at(bed, bed->edge[below]);
     if (1 - (bed->mass[cell] + mass) / scene->bed.density / bed->area[cell] < 0.2)
         return deposit->kind;
     bed->mass[cell] += mass;

@@ -241,19 +241,13 @@ static bool cell_keep(const silt_scene *scene, const double p[2], const double q
     return false;
 }
 
-silt_status silt_bed_create(silt_bed *bed, const silt_scene *scene, silt_error *err) {
+// triangles between outlines and lattice
+static silt_status fill_plane(silt_bed *bed, const silt_scene *scene, silt_error *err) {
     const char *path = scene->path ? scene->path : "scene";
     bed_cloud cloud = {0};
     bed_sides sides = {0};
     int *triangle = NULL, n_triangle = 0;
     silt_status status = SILT_OK;
-    silt_bed_clear(bed);
-    silt_bed_index_build(bed);
-    if (!(bed_size(scene) > 0)) {
-        status = silt_fail(err, SILT_INPUT, "%s: bed.size: %g found; allowed: a length above 0", path, bed_size(scene));
-        goto out;
-    }
-
     sides_collect(&sides, scene);
     for (int k = 0; k < sides.count; k++)
         side_divide(&sides.side[k], &sides, scene, &cloud);
@@ -285,32 +279,49 @@ silt_status silt_bed_create(silt_bed *bed, const silt_scene *scene, silt_error *
     for (int k = 0; k < n_triangle; k++) {
         const int *t = triangle + 3 * (size_t)k;
         if (cell_keep(scene, cloud.point[t[0]], cloud.point[t[1]], cloud.point[t[2]])) {
-            const int cell = silt_bed_cell_add(bed, t[0], t[1], t[2], 0);
-            bed->mass[cell] = scene->bed.density * (1 - scene->bed.porosity) * bed->area[cell];
+            silt_bed_cell_add(bed, t, 0);
         }
     }
-    if (bed->n_cell == 0) {
-        status = silt_fail(err, SILT_INPUT,
-                           "%s: bed.regions: %d regions hold no cell of bed.size = %g m; allowed: at least one "
-                           "region with an area",
-                           path, scene->bed.n_region, bed_size(scene));
-        goto out;
-    }
-    silt_bed_index_build(bed);
-    for (int c = 0; c < bed->n_cell; c++)
-        for (int a = 0; a < 3; a++) {
-            const int from = bed->cell[c][a], to = bed->cell[c][(a + 1) % 3];
-            if (silt_bed_cell_at(bed, to, from) < 0)
-                silt_bed_edge_add(bed, scene, to, from);
-        }
-    silt_bed_refresh(bed);
-    bed->initial_mass = bed->solid_mass;
 out:
-    if (status)
-        silt_bed_clear(bed);
     free(triangle);
     free(sides.side);
     free(cloud.point);
     free(cloud.piece);
     return status;
+}
+
+silt_status silt_bed_create(silt_bed *bed, const silt_scene *scene, const silt_walls *walls, silt_error *err) {
+    const char *path = scene->path ? scene->path : "scene";
+    silt_bed_clear(bed);
+    bed->dim = scene->dimension == 3 ? 3 : 2;
+    bed->walls = walls;
+    silt_bed_index_build(bed);
+    silt_status status = SILT_OK;
+    if (!(bed_size(scene) > 0))
+        status = silt_fail(err, SILT_INPUT, "%s: bed.size: %g found; allowed: a length above 0", path, bed_size(scene));
+    else
+        status = bed->dim == 3 ? silt_bed_fill_space(bed, scene, err) : fill_plane(bed, scene, err);
+    if (status == SILT_OK && bed->n_cell == 0)
+        status = silt_fail(err, SILT_INPUT,
+                           "%s: bed.regions: %d regions hold no cell of bed.size = %g m; allowed: at least one "
+                           "region with %s",
+                           path, scene->bed.n_region, bed_size(scene), bed->dim == 3 ? "a volume" : "an area");
+    if (status != SILT_OK) {
+        silt_bed_clear(bed);
+        return status;
+    }
+    silt_bed_index_build(bed);
+    for (int c = 0; c < bed->n_cell; c++) {
+        bed->mass[c] = scene->bed.density * (1 - scene->bed.porosity) * bed->area[c];
+        for (int a = 0; a <= bed->dim; a++) {
+            int facet[3], turned[3];
+            bed_facet(bed->dim, bed->cell[c], a, facet);
+            bed_facet_turned(facet, turned);
+            if (silt_bed_cell_at(bed, turned) < 0)
+                silt_bed_edge_add(bed, scene, facet);
+        }
+    }
+    silt_bed_refresh(bed);
+    bed->initial_mass = bed->solid_mass;
+    return SILT_OK;
 }

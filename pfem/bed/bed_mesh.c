@@ -2,9 +2,11 @@
 
 #include "bed_mesh.h"
 
+#define HOLDS_SLACK 1e-11 // times the cube of a bin: six times the volume by which a place may lie outside of a cell in space
+
 // ---------------------------------------------------------------- walls
 
-bool silt_bed_on_wall(const silt_scene *scene, const double p[2], const double q[2]) {
+static bool plane_on_wall(const silt_scene *scene, const double *p, const double *q) {
     const double close = 1e-6 * bed_size(scene);
     for (int w = 0; w < scene->n_wall; w++)
         for (int k = 0; k < bed_wall_pieces(&scene->wall[w]); k++) {
@@ -15,39 +17,60 @@ bool silt_bed_on_wall(const silt_scene *scene, const double p[2], const double q
     return false;
 }
 
-// ---------------------------------------------------------------- index: cells of a node, cells at a place
-
-static int index_bin(const silt_bed_index *index, const double x[2]) {
-    // what lies outside the grid belongs to its rim: two points closer than a bin stay in the same or in adjoining bins
-    const double i = silt_clamp(floor((x[0] - index->lo[0]) / index->bin), 0, index->nx - 1);
-    const double j = silt_clamp(floor((x[1] - index->lo[1]) / index->bin), 0, index->ny - 1);
-    return (int)j * index->nx + (int)i;
+bool silt_bed_on_wall(const silt_bed *bed, const silt_scene *scene, const int facet[3]) {
+    if (bed_dim(bed) == 2)
+        return plane_on_wall(scene, bed->x[facet[0]], bed->x[facet[1]]);
+    const int *element[3];
+    for (int k = 0; k < 3; k++) {
+        element[k] = bed->wall[facet[k]];
+        if (element[k][0] < 0)
+            return false;
+    }
+    return silt_walls_share(bed->walls, 3, element);
 }
 
-static void cell_centroid(const silt_bed *bed, int cell, double centre[2]) {
-    const int *node = bed->cell[cell];
-    for (int d = 0; d < 2; d++)
-        centre[d] = (bed->x[node[0]][d] + bed->x[node[1]][d] + bed->x[node[2]][d]) / 3;
+// ---------------------------------------------------------------- index: cells of a node, cells at a place
+
+static int index_bin(const silt_bed_index *index, int dim, const double *x) {
+    // what lies outside the grid belongs to its rim: two points closer than a bin stay in the same or in adjoining bins
+    int at[3] = {0};
+    for (int d = 0; d < dim; d++)
+        at[d] = (int)silt_clamp(floor((x[d] - index->lo[d]) / index->bin), 0, index->n[d] - 1);
+    return (at[2] * index->n[1] + at[1]) * index->n[0] + at[0];
+}
+
+static void cell_centroid(const silt_bed *bed, int cell, double centre[3]) {
+    const int *node = bed->cell[cell], dim = bed_dim(bed);
+    for (int d = 0; d < 3; d++)
+        centre[d] = dim == 3 ? (bed->x[node[0]][d] + bed->x[node[1]][d] + bed->x[node[2]][d] + bed->x[node[3]][d]) / 4
+                             : (bed->x[node[0]][d] + bed->x[node[1]][d] + bed->x[node[2]][d]) / 3;
 }
 
 static double cell_reach(const silt_bed *bed, int cell) {
-    double centre[2], reach = 0;
+    double centre[3], reach = 0;
     cell_centroid(bed, cell, centre);
-    for (int a = 0; a < 3; a++)
-        reach = silt_max(reach, bed_distance(centre, bed->x[bed->cell[cell][a]]));
+    for (int a = 0; a <= bed_dim(bed); a++)
+        reach = silt_max(reach, bed_apart(bed_dim(bed), centre, bed->x[bed->cell[cell][a]]));
     return reach;
+}
+
+static double cell_volume(const silt_bed *bed, int cell) {
+    const int *node = bed->cell[cell];
+    if (bed_dim(bed) == 3)
+        return bed_volume6(bed->x[node[0]], bed->x[node[1]], bed->x[node[2]], bed->x[node[3]]) / 6;
+    return 0.5 * bed_cross(bed->x[node[0]], bed->x[node[1]], bed->x[node[2]]);
 }
 
 static void index_link(silt_bed *bed, int cell) {
     silt_bed_index *index = bed->index;
-    for (int a = 0; a < 3; a++) {
+    for (int a = 0; a <= bed_dim(bed); a++) {
         const int node = bed->cell[cell][a];
-        index->next[3 * cell + a] = index->first[node];
-        index->first[node] = 3 * cell + a;
+        index->next[4 * cell + a] = index->first[node];
+        index->first[node] = 4 * cell + a;
     }
-    double centre[2];
+    double centre[3];
     cell_centroid(bed, cell, centre);
-    int *head = &index->head[index_bin(index, centre)];
+    int *head = &index->head[index_bin(index, bed_dim(bed), centre)];
     index->before[cell] = -1;
     index->after[cell] = *head;
     if (*head >= 0)
@@ -57,19 +80,19 @@ static void index_link(silt_bed *bed, int cell) {
 
 static void index_unlink(silt_bed *bed, int cell) {
     silt_bed_index *index = bed->index;
-    for (int a = 0; a < 3; a++) {
+    for (int a = 0; a <= bed_dim(bed); a++) {
         int *place = &index->first[bed->cell[cell][a]];
-        while (*place != 3 * cell + a)
+        while (*place != 4 * cell + a)
             place = &index->next[*place];
-        *place = index->next[3 * cell + a];
+        *place = index->next[4 * cell + a];
     }
-    double centre[2];
+    double centre[3];
     cell_centroid(bed, cell, centre);
     const int before = index->before[cell], after = index->after[cell];
     if (before >= 0)
         index->after[before] = after;
     else
-        index->head[index_bin(index, centre)] = after;
+        index->head[index_bin(index, bed_dim(bed), centre)] = after;
     if (after >= 0)
         index->before[after] = before;
 }
@@ -95,8 +118,8 @@ static void index_reserve_cells(silt_bed *bed, int need) {
     SILT_RESERVE(index->after, capacity, need);
     capacity = index->cell_capacity;
     SILT_RESERVE(index->before, capacity, need);
-    int places = 3 * index->cell_capacity;
-    SILT_RESERVE(index->next, places, 3 * capacity);
+    int places = 4 * index->cell_capacity;
+    SILT_RESERVE(index->next, places, 4 * capacity);
     index->cell_capacity = capacity;
 }
 
@@ -113,6 +136,13 @@ static void index_free(silt_bed_index *index) {
     free(index);
 }
 
+static void index_span(silt_bed_index *index, const double *x, bool first) {
+    for (int d = 0; d < 3; d++) {
+        index->box_lo[d] = first ? x[d] : silt_min(index->box_lo[d], x[d]);
+        index->box_hi[d] = first ? x[d] : silt_max(index->box_hi[d], x[d]);
+    }
+}
+
 void silt_bed_index_build(silt_bed *bed) {
     index_free(bed->index);
     silt_bed_index *index = bed->index = silt_alloc(1, sizeof *index);
@@ -120,22 +150,23 @@ void silt_bed_index_build(silt_bed *bed) {
     index_reserve_cells(bed, bed->n_cell);
 
     // the grid's box is that of the nodes; deposits may lie outside it
-    double hi[2] = {0, 0}, reach = 0;
+    double widest = 0, reach = 0;
     for (int i = 0; i < bed->n_node; i++)
-        for (int d = 0; d < 2; d++) {
-            index->lo[d] = i ? silt_min(index->lo[d], bed->x[i][d]) : bed->x[i][d];
-            hi[d] = i ? silt_max(hi[d], bed->x[i][d]) : bed->x[i][d];
-        }
+        index_span(index, bed->x[i], i == 0);
     for (int c = 0; c < bed->n_cell; c++)
         reach = silt_max(reach, cell_reach(bed, c));
-    const double wide = hi[0] - index->lo[0], high = hi[1] - index->lo[1];
-    index->bin = silt_max(1.3 * reach, 1e-3 * silt_max(wide, high));
+    for (int d = 0; d < 3; d++) {
+        index->lo[d] = index->box_lo[d];
+        widest = silt_max(widest, index->box_hi[d] - index->lo[d]);
+    }
+    index->bin = silt_max(1.3 * reach, 1e-3 * widest);
     if (!(index->bin > 0))
         index->bin = 1;
-    index->nx = (int)(wide / index->bin) + 1;
-    index->ny = (int)(high / index->bin) + 1;
-    SILT_RESERVE(index->head, index->bin_capacity, index->nx * index->ny);
-    for (int b = 0; b < index->nx * index->ny; b++)
+    for (int d = 0; d < 3; d++)
+        index->n[d] = (int)((index->box_hi[d] - index->lo[d]) / index->bin) + 1;
+    const int n_bin = index->n[0] * index->n[1] * index->n[2];
+    SILT_RESERVE(index->head, index->bin_capacity, n_bin);
+    for (int b = 0; b < n_bin; b++)
         index->head[b] = -1;
     for (int i = 0; i < bed->n_node; i++)
         index->first[i] = -1;
@@ -145,7 +176,7 @@ void silt_bed_index_build(silt_bed *bed) {
 
 // ---------------------------------------------------------------- nodes, cells, edges
 
-static void node_reserve(silt_bed *bed, int need) {
+void silt_bed_reserve_nodes(silt_bed *bed, int need) {
     int capacity = bed->node_capacity;
     // all arrays have one capacity; each call starts from the old one
 #define RESERVE(array) (capacity = bed->node_capacity, SILT_RESERVE(bed->array, capacity, need))
@@ -156,11 +187,13 @@ static void node_reserve(silt_bed *bed, int need) {
     RESERVE(eroded);
     RESERVE(shear);
     RESERVE(fluid_node);
+    RESERVE(wall);
+    RESERVE(corner);
 #undef RESERVE
     bed->node_capacity = capacity;
 }
 
-static void cell_reserve(silt_bed *bed, int need) {
+void silt_bed_reserve_cells(silt_bed *bed, int need) {
     int capacity = bed->cell_capacity;
     SILT_RESERVE(bed->cell, capacity, need);
     capacity = bed->cell_capacity;
@@ -170,41 +203,45 @@ static void cell_reserve(silt_bed *bed, int need) {
     bed->cell_capacity = capacity;
 }
 
-int silt_bed_node_add(silt_bed *bed, const double x[2]) {
+int silt_bed_node_add(silt_bed *bed, const double *x) {
     const int node = bed->n_node;
-    node_reserve(bed, node + 1);
+    silt_bed_reserve_nodes(bed, node + 1);
     index_reserve_nodes(bed, node + 1);
     bed->n_node++;
-    bed->x[node][0] = x[0];
-    bed->x[node][1] = x[1];
+    for (int d = 0; d < 3; d++)
+        bed->x[node][d] = d < bed_dim(bed) ? x[d] : 0;
     bed->alive[node] = bed->exposed[node] = 0;
     bed->work[node] = bed->eroded[node] = bed->shear[node] = 0;
-    bed->fluid_node[node] = -1;
-    bed->index->first[node] = -1;
-    bed->index->length[node] = bed->index->outward[node][0] = bed->index->outward[node][1] = 0;
+    bed->fluid_node[node] = bed->corner[node] = -1;
+    bed->wall[node][0] = bed->wall[node][1] = bed->wall[node][2] = -1;
+    silt_bed_index *index = bed->index;
+    index->first[node] = -1;
+    index->length[node] = index->outward[node][0] = index->outward[node][1] = index->outward[node][2] = 0;
+    index_span(index, bed->x[node], node == 0);
     return node;
 }
 
-int silt_bed_cell_add(silt_bed *bed, int a, int b, int c, double mass) {
+int silt_bed_cell_add(silt_bed *bed, const int *node, double mass) {
     const int cell = bed->n_cell;
-    cell_reserve(bed, cell + 1);
+    silt_bed_reserve_cells(bed, cell + 1);
     index_reserve_cells(bed, cell + 1);
     bed->n_cell++;
-    memcpy(bed->cell[cell], (int[3]){a, b, c}, sizeof bed->cell[cell]);
-    bed->area[cell] = 0.5 * bed_cross(bed->x[a], bed->x[b], bed->x[c]);
+    memcpy(bed->cell[cell], (int[4]){node[0], node[1], node[2], bed_dim(bed) == 3 ? node[3] : -1}, sizeof bed->cell[cell]);
+    bed->area[cell] = cell_volume(bed, cell);
     bed->mass[cell] = mass;
     index_link(bed, cell);
     // a cell that is wider than the bins would not be found
     if (cell_reach(bed, cell) > bed->index->bin)
         silt_bed_index_build(bed);
-    bed->alive[a] = bed->alive[b] = bed->alive[c] = 1;
+    for (int a = 0; a <= bed_dim(bed); a++)
+        bed->alive[node[a]] = 1;
     return cell;
 }
 
 void silt_bed_cell_remove(silt_bed *bed, int cell) {
     const int last = bed->n_cell - 1;
     index_unlink(bed, cell);
-    for (int a = 0; a < 3; a++) {
+    for (int a = 0; a <= bed_dim(bed); a++) {
         const int node = bed->cell[cell][a];
         bed->alive[node] = bed->index->first[node] >= 0;
     }
@@ -218,43 +255,77 @@ void silt_bed_cell_remove(silt_bed *bed, int cell) {
     bed->n_cell = last;
 }
 
-int silt_bed_cell_at(const silt_bed *bed, int a, int b) {
-    for (int place = bed->index->first[a]; place >= 0; place = bed->index->next[place])
-        if (bed->cell[place / 3][(place % 3 + 1) % 3] == b)
-            return place / 3;
+// true for the same nodes in the same sense
+static bool facet_same(int dim, const int a[3], const int b[3]) {
+    if (dim == 2)
+        return a[0] == b[0] && a[1] == b[1];
+    for (int k = 0; k < 3; k++)
+        if (a[0] == b[k])
+            return a[1] == b[(k + 1) % 3] && a[2] == b[(k + 2) % 3];
+    return false;
+}
+
+int silt_bed_cell_at(const silt_bed *bed, const int facet[3]) {
+    const int dim = bed_dim(bed);
+    for (int place = bed->index->first[facet[0]]; place >= 0; place = bed->index->next[place]) {
+        const int *cell = bed->cell[place / 4];
+        for (int k = 0; k <= dim; k++) {
+            int own[3];
+            if (dim == 3 && (cell[k] == facet[0] || cell[k] == facet[1] || cell[k] == facet[2]))
+                continue;
+            bed_facet(dim, cell, k, own);
+            if (facet_same(dim, own, facet))
+                return place / 4;
+        }
+    }
     return -1;
 }
 
-void silt_bed_edge_add(silt_bed *bed, const silt_scene *scene, int a, int b) {
-    if (silt_bed_on_wall(scene, bed->x[a], bed->x[b]))
+void silt_bed_edge_add(silt_bed *bed, const silt_scene *scene, const int facet[3]) {
+    if (silt_bed_on_wall(bed, scene, facet))
         return;
     SILT_RESERVE(bed->edge, bed->edge_capacity, bed->n_edge + 1);
-    bed->edge[bed->n_edge][0] = a;
-    bed->edge[bed->n_edge][1] = b;
-    bed->n_edge++;
+    memcpy(bed->edge[bed->n_edge++], facet, sizeof *bed->edge);
 }
 
-void silt_bed_edge_remove(silt_bed *bed, int a, int b) {
+void silt_bed_edge_remove(silt_bed *bed, const int facet[3]) {
     // the order of the others stays, so that sums over a node's edges keep their bits
     for (int e = 0; e < bed->n_edge; e++)
-        if (bed->edge[e][0] == a && bed->edge[e][1] == b) {
+        if (facet_same(bed_dim(bed), bed->edge[e], facet)) {
             bed->n_edge--;
             memmove(bed->edge[e], bed->edge[e + 1], (size_t)(bed->n_edge - e) * sizeof *bed->edge);
             return;
         }
 }
 
+void silt_bed_facet_normal(const silt_bed *bed, const int facet[3], double *normal) {
+    const double *p = bed->x[facet[0]], *q = bed->x[facet[1]];
+    if (bed_dim(bed) == 2) {
+        normal[0] = -(q[1] - p[1]);
+        normal[1] = q[0] - p[0];
+        return;
+    }
+    const double *r = bed->x[facet[2]];
+    for (int d = 0; d < 3; d++) {
+        const int e = (d + 1) % 3, f = (d + 2) % 3;
+        normal[d] = 0.5 * ((q[e] - p[e]) * (r[f] - p[f]) - (q[f] - p[f]) * (r[e] - p[e]));
+    }
+}
+
 void silt_bed_refresh(silt_bed *bed) {
     silt_bed_index *index = bed->index;
+    const int dim = bed_dim(bed);
     for (int i = 0; i < bed->n_node; i++)
-        index->length[i] = index->outward[i][0] = index->outward[i][1] = 0;
+        index->length[i] = index->outward[i][0] = index->outward[i][1] = index->outward[i][2] = 0;
     for (int e = 0; e < bed->n_edge; e++) {
-        const double *p = bed->x[bed->edge[e][0]], *q = bed->x[bed->edge[e][1]];
-        for (int end = 0; end < 2; end++) {
+        double normal[3] = {0};
+        silt_bed_facet_normal(bed, bed->edge[e], normal);
+        const double length = hypot(hypot(normal[0], normal[1]), normal[2]);
+        for (int end = 0; end < dim; end++) {
             const int node = bed->edge[e][end];
-            index->outward[node][0] -= 0.5 * (q[1] - p[1]);
-            index->outward[node][1] += 0.5 * (q[0] - p[0]);
-            index->length[node] += 0.5 * bed_distance(p, q);
+            for (int d = 0; d < dim; d++)
+                index->outward[node][d] += normal[d] / dim;
+            index->length[node] += length / dim;
         }
     }
     for (int i = 0; i < bed->n_node; i++)
@@ -279,6 +350,8 @@ void silt_bed_clear(silt_bed *bed) {
     free(bed->eroded);
     free(bed->shear);
     free(bed->fluid_node);
+    free(bed->wall);
+    free(bed->corner);
     free(bed->cell);
     free(bed->mass);
     free(bed->area);
@@ -289,147 +362,113 @@ void silt_bed_clear(silt_bed *bed) {
 
 // ---------------------------------------------------------------- questions
 
-void silt_bed_normal(const silt_bed *bed, int node, double normal[2]) {
-    const double *outward = bed->index->outward[node];
-    const double length = hypot(outward[0], outward[1]);
-    if (length > 1e-9 * bed->index->length[node]) {
-        normal[0] = outward[0] / length;
-        normal[1] = outward[1] / length;
-        return;
-    }
-    // the edges cancel (a spike, or a node between two patches): the normal of one of them
-    normal[0] = 0;
-    normal[1] = 1;
-    for (int e = 0; e < bed->n_edge; e++)
-        if (bed->edge[e][0] == node || bed->edge[e][1] == node) {
-            const double *p = bed->x[bed->edge[e][0]], *q = bed->x[bed->edge[e][1]];
-            normal[0] = -(q[1] - p[1]) / bed_distance(p, q);
-            normal[1] = (q[0] - p[0]) / bed_distance(p, q);
-            return;
+void silt_bed_normal(const silt_bed *bed, int node, double *normal) {
+    const int dim = bed_dim(bed);
+    double n[3] = {0};
+    memcpy(n, bed->index->outward[node], sizeof n);
+    double length = hypot(hypot(n[0], n[1]), n[2]);
+    if (!(length > 1e-9 * bed->index->length[node])) {
+        // the edges cancel (a spike, or a node between two patches): the normal of one of them
+        n[0] = n[1] = n[2] = 0;
+        n[dim - 1] = length = 1;
+        for (int e = 0; e < bed->n_edge; e++) {
+            const int *edge = bed->edge[e];
+            if (edge[0] != node && edge[1] != node && edge[2] != node)
+                continue;
+            silt_bed_facet_normal(bed, edge, n);
+            length = hypot(hypot(n[0], n[1]), n[2]);
+            break;
         }
+    }
+    for (int d = 0; d < dim; d++)
+        normal[d] = n[d] / length;
 }
 
-static bool cell_holds(const silt_bed *bed, int cell, const double x[2]) {
-    const double *p = bed->x[bed->cell[cell][0]], *q = bed->x[bed->cell[cell][1]], *r = bed->x[bed->cell[cell][2]];
-    return bed_cross(p, q, x) >= 0 && bed_cross(q, r, x) >= 0 && bed_cross(r, p, x) >= 0;
+static bool cell_holds(const silt_bed *bed, int cell, const double *x) {
+    const int *node = bed->cell[cell];
+    const double *p = bed->x[node[0]], *q = bed->x[node[1]], *r = bed->x[node[2]];
+    if (bed_dim(bed) == 2)
+        return bed_cross(p, q, x) >= 0 && bed_cross(q, r, x) >= 0 && bed_cross(r, p, x) >= 0;
+    // a place on a face of a tank is seldom in it to the last bit
+    const double *s = bed->x[node[3]], slack = -HOLDS_SLACK * bed->index->bin * bed->index->bin * bed->index->bin;
+    return bed_volume6(p, q, r, x) >= slack && bed_volume6(p, s, q, x) >= slack && bed_volume6(q, s, r, x) >= slack &&
+           bed_volume6(p, r, s, x) >= slack;
 }
 
-bool silt_bed_contains(const silt_bed *bed, const double x[2]) {
+// bins that a box around x meets
+static void index_range(const silt_bed *bed, const double *x, double reach, int lo[3], int hi[3]) {
     const silt_bed_index *index = bed->index;
-    if (!index || bed->n_cell == 0)
+    for (int d = 0; d < 3; d++) {
+        lo[d] = hi[d] = 0;
+        if (d >= bed_dim(bed))
+            continue;
+        lo[d] = (int)silt_clamp(floor((x[d] - reach - index->lo[d]) / index->bin), 0, index->n[d] - 1);
+        hi[d] = (int)silt_clamp(floor((x[d] + reach - index->lo[d]) / index->bin), 0, index->n[d] - 1);
+    }
+}
+
+// false when x lies farther than reach outside of all nodes
+static bool index_spans(const silt_bed *bed, const double *x, double reach) {
+    const silt_bed_index *index = bed->index;
+    for (int d = 0; d < bed_dim(bed); d++)
+        if (x[d] < index->box_lo[d] - reach || x[d] > index->box_hi[d] + reach)
+            return false;
+    return true;
+}
+
+bool silt_bed_contains(const silt_bed *bed, const double *x) {
+    const silt_bed_index *index = bed->index;
+    if (!index || bed->n_cell == 0 || !index_spans(bed, x, 0))
         return false;
-    const int bin = index_bin(index, x), i = bin % index->nx, j = bin / index->nx;
-    for (int v = j > 0 ? j - 1 : 0; v <= j + 1 && v < index->ny; v++)
-        for (int u = i > 0 ? i - 1 : 0; u <= i + 1 && u < index->nx; u++)
-            for (int cell = index->head[v * index->nx + u]; cell >= 0; cell = index->after[cell])
-                if (cell_holds(bed, cell, x))
-                    return true;
+    int lo[3], hi[3];
+    index_range(bed, x, index->bin, lo, hi);
+    for (int k = lo[2]; k <= hi[2]; k++)
+        for (int j = lo[1]; j <= hi[1]; j++)
+            for (int i = lo[0]; i <= hi[0]; i++)
+                for (int cell = index->head[(k * index->n[1] + j) * index->n[0] + i]; cell >= 0; cell = index->after[cell])
+                    if (cell_holds(bed, cell, x))
+                        return true;
     return false;
 }
 
-double silt_bed_level(const silt_bed *bed, double x) {
+bool silt_bed_near(const silt_bed *bed, const double *x, double reach) {
+    const silt_bed_index *index = bed->index;
+    if (!index || bed->n_cell == 0 || !(reach > 0) || !index_spans(bed, x, reach))
+        return false;
+    int lo[3], hi[3];
+    index_range(bed, x, reach + index->bin, lo, hi);
+    for (int k = lo[2]; k <= hi[2]; k++)
+        for (int j = lo[1]; j <= hi[1]; j++)
+            for (int i = lo[0]; i <= hi[0]; i++)
+                for (int cell = index->head[(k * index->n[1] + j) * index->n[0] + i]; cell >= 0; cell = index->after[cell])
+                    for (int a = 0; a <= bed_dim(bed); a++) {
+                        const int node = bed->cell[cell][a];
+                        if (bed->exposed[node] && bed_apart(bed_dim(bed), bed->x[node], x) < reach)
+                            return true;
+                    }
+    return false;
+}
+
+static double edge_level(const double *p, const double *q, double x) {
+    const double reach = fabs(q[0] - p[0]);
+    if (x < silt_min(p[0], q[0]) || x > silt_max(p[0], q[0]))
+        return -HUGE_VAL;
+    return reach > 0 ? p[1] + (x - p[0]) / (q[0] - p[0]) * (q[1] - p[1]) : silt_max(p[1], q[1]);
+}
+
+// where the vertical through (x, y) meets a face; upright ones have their neighbours' rims
+static double face_level(const double *p, const double *q, const double *r, const double *x) {
+    const double a = bed_cross(q, r, x), b = bed_cross(r, p, x), c = bed_cross(p, q, x), sum = a + b + c;
+    const bool in = (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0);
+    return in && sum != 0 ? (a * p[2] + b * q[2] + c * r[2]) / sum : -HUGE_VAL;
+}
+
+double silt_bed_level(const silt_bed *bed, const double *at) {
     double level = -HUGE_VAL;
     for (int e = 0; e < bed->n_edge; e++) {
-        const double *p = bed->x[bed->edge[e][0]], *q = bed->x[bed->edge[e][1]];
-        const double reach = fabs(q[0] - p[0]);
-        if (x < silt_min(p[0], q[0]) || x > silt_max(p[0], q[0]))
-            continue;
-        level = silt_max(level, reach > 0 ? p[1] + (x - p[0]) / (q[0] - p[0]) * (q[1] - p[1]) : silt_max(p[1], q[1]));
+        const int *edge = bed->edge[e];
+        const double *p = bed->x[edge[0]], *q = bed->x[edge[1]];
+        level = silt_max(level, bed_dim(bed) == 3 ? face_level(p, q, bed->x[edge[2]], at) : edge_level(p, q, at[0]));
     }
     return level;
-}
-
-// ---------------------------------------------------------------- checkpoint
-
-typedef struct bed_array {
-    const char *name;
-    silt_store_type type;
-    int per, width; // count[per] rows of this many numbers
-    void *data;
-} bed_array;
-
-enum { PER_NODE, PER_CELL, PER_EDGE, PER_BED, N_ARRAY = 13 };
-
-static void bed_arrays(silt_bed *bed, double sum[3], bed_array array[N_ARRAY]) {
-    const bed_array all[N_ARRAY] = {
-        {"bed/x", STORE_DOUBLE, PER_NODE, 2, bed->x},
-        {"bed/alive", STORE_BYTE, PER_NODE, 1, bed->alive},
-        {"bed/exposed", STORE_BYTE, PER_NODE, 1, bed->exposed},
-        {"bed/work", STORE_DOUBLE, PER_NODE, 1, bed->work},
-        {"bed/eroded", STORE_DOUBLE, PER_NODE, 1, bed->eroded},
-        {"bed/shear", STORE_DOUBLE, PER_NODE, 1, bed->shear},
-        {"bed/fluid_node", STORE_INT, PER_NODE, 1, bed->fluid_node},
-        {"bed/cell", STORE_INT, PER_CELL, 3, bed->cell},
-        {"bed/mass", STORE_DOUBLE, PER_CELL, 1, bed->mass},
-        {"bed/area", STORE_DOUBLE, PER_CELL, 1, bed->area},
-        {"bed/edge", STORE_INT, PER_EDGE, 2, bed->edge},
-        {"bed/revision", STORE_LONG, PER_BED, 1, &bed->revision},
-        {"bed/sum", STORE_DOUBLE, PER_BED, 3, sum},
-    };
-    memcpy(array, all, sizeof all);
-}
-
-silt_status silt_bed_save(const silt_bed *bed, silt_store *store, silt_error *err) {
-    silt_bed borrowed = *bed;
-    double sum[3] = {bed->solid_mass, bed->initial_mass, bed->pore_water};
-    bed_array array[N_ARRAY];
-    bed_arrays(&borrowed, sum, array);
-    const int64_t count[4] = {bed->n_node, bed->n_cell, bed->n_edge, 1};
-    SILT_TRY(silt_store_put(store, "bed/count", STORE_LONG, 4, count, err));
-    // a bed that is washed away has no cells: nothing is written for what is empty
-    for (int k = 0; k < N_ARRAY; k++) {
-        const size_t n = (size_t)count[array[k].per] * (size_t)array[k].width;
-        if (n > 0)
-            SILT_TRY(silt_store_put(store, array[k].name, array[k].type, n, array[k].data, err));
-    }
-    return SILT_OK;
-}
-
-silt_status silt_bed_load(silt_bed *bed, silt_store *store, silt_error *err) {
-    silt_bed_clear(bed);
-    int64_t count[4];
-    SILT_TRY(silt_store_take(store, "bed/count", STORE_LONG, 4, count, err));
-    for (int k = 0; k < 4; k++)
-        if (count[k] < 0 || count[k] > INT32_MAX / 4)
-            return silt_fail(err, SILT_FAILED, "checkpoint: bed/count[%d] is %lld; allowed: 0 to %d", k,
-                             (long long)count[k], INT32_MAX / 4);
-    bed->n_node = (int)count[0];
-    bed->n_cell = (int)count[1];
-    bed->n_edge = (int)count[2];
-    node_reserve(bed, bed->n_node);
-    cell_reserve(bed, bed->n_cell);
-    SILT_RESERVE(bed->edge, bed->edge_capacity, bed->n_edge);
-
-    double sum[3] = {0};
-    bed_array array[N_ARRAY];
-    bed_arrays(bed, sum, array);
-    silt_status status = SILT_OK;
-    for (int k = 0; k < N_ARRAY && !status; k++) {
-        const size_t n = (size_t)count[array[k].per] * (size_t)array[k].width;
-        if (n > 0)
-            status = silt_store_take(store, array[k].name, array[k].type, n, array[k].data, err);
-    }
-    // numbers from a file are looked at before they are used as indices
-    for (int c = 0; c < bed->n_cell && !status; c++)
-        for (int a = 0; a < 3 && !status; a++)
-            if (bed->cell[c][a] < 0 || bed->cell[c][a] >= bed->n_node)
-                status = silt_fail(err, SILT_FAILED, "checkpoint: bed/cell[%d][%d] is %d; there are %d nodes", c, a,
-                                   bed->cell[c][a], bed->n_node);
-    for (int e = 0; e < bed->n_edge && !status; e++)
-        for (int a = 0; a < 2 && !status; a++)
-            if (bed->edge[e][a] < 0 || bed->edge[e][a] >= bed->n_node)
-                status = silt_fail(err, SILT_FAILED, "checkpoint: bed/edge[%d][%d] is %d; there are %d nodes", e, a,
-                                   bed->edge[e][a], bed->n_node);
-    if (status) {
-        silt_bed_clear(bed);
-        return status;
-    }
-    const int64_t revision = bed->revision;
-    silt_bed_index_build(bed);
-    silt_bed_refresh(bed);
-    bed->revision = revision;
-    bed->solid_mass = sum[0];
-    bed->initial_mass = sum[1];
-    bed->pore_water = sum[2];
-    return SILT_OK;
 }

@@ -9,39 +9,79 @@
 /** What is derived from nodes and cells. Never saved: it is made again on loading, and nothing depends on its order. */
 typedef struct silt_bed_index {
     int node_capacity, cell_capacity;
-    int *first;           // owned, one per node: a place 3 cell + corner that holds the node, or -1
-    int *next;            // owned, three per cell: the node's next place, or -1
-    double (*outward)[2]; // owned, one per node: half the sum of its exposed edges' normals times their lengths, m
-    double *length;       // owned, one per node: half the sum of its exposed edges' lengths, m
-    double lo[2], bin;    // a grid of bins as wide as the largest distance of a corner from its cell's centroid
-    int nx, ny, bin_capacity;
+    int *first;           // owned, one per node: a place 4 cell + corner that holds the node, or -1
+    int *next;            // owned, four per cell: the node's next place, or -1
+    double (*outward)[3]; // owned, one per node: its share of its exposed edges' normals times their lengths (half), m; faces: a third, m2
+    double *length;       // owned, one per node: its share of its exposed edges' lengths, m, in space of faces, m2
+    double box_lo[3], box_hi[3]; // m, of all nodes that there ever were
+    double lo[3], bin;    // a grid of bins as wide as the largest distance of a corner from its cell's centroid
+    int n[3], bin_capacity;
     int *head;           // owned, one per bin: a cell whose centroid lies there, or -1
     int *after, *before; // owned, one per cell: its neighbours in the bin
 } silt_bed_index;
 
-int silt_bed_node_add(silt_bed *bed, const double x[2]);
-/** a, b, c counter-clockwise. @return the new cell, the last one */
-int silt_bed_cell_add(silt_bed *bed, int a, int b, int c, double mass);
+/** room for so many */
+void silt_bed_reserve_nodes(silt_bed *bed, int need);
+void silt_bed_reserve_cells(silt_bed *bed, int need);
+int silt_bed_node_add(silt_bed *bed, const double *x);
+/** node: counter-clockwise (the fourth is -1), or of positive volume. @return the new cell, the last one */
+int silt_bed_cell_add(silt_bed *bed, const int *node, double mass);
 /** Takes the cell out; the last cell takes its number. */
 void silt_bed_cell_remove(silt_bed *bed, int cell);
-/** the cell that has a -> b as one of its counter-clockwise edges, or -1 */
-int silt_bed_cell_at(const silt_bed *bed, int a, int b);
-/** Adds a -> b (bed on the right) to the surface unless it lies on a wall. */
-void silt_bed_edge_add(silt_bed *bed, const silt_scene *scene, int a, int b);
-void silt_bed_edge_remove(silt_bed *bed, int a, int b);
+/** the cell that has the facet among its own (bed_facet), or -1 */
+int silt_bed_cell_at(const silt_bed *bed, const int facet[3]);
+/** Adds a facet to the surface unless it lies on a wall. */
+void silt_bed_edge_add(silt_bed *bed, const silt_scene *scene, const int facet[3]);
+void silt_bed_edge_remove(silt_bed *bed, const int facet[3]);
 /** After cells or edges changed: exposed, index->outward and length, solid_mass; raises the revision. */
 void silt_bed_refresh(silt_bed *bed);
 /** Makes the index for the nodes and cells that there are (creation, loading). */
 void silt_bed_index_build(silt_bed *bed);
-/** true when both ends lie on one and the same straight piece of a wall */
-bool silt_bed_on_wall(const silt_scene *scene, const double p[2], const double q[2]);
+/** true when the facet lies on a wall */
+bool silt_bed_on_wall(const silt_bed *bed, const silt_scene *scene, const int facet[3]);
+/** the bed in space (bed_space.c), empty before; index and surface are left to the caller */
+silt_status silt_bed_fill_space(silt_bed *bed, const silt_scene *scene, silt_error *err);
+
+static inline int bed_dim(const silt_bed *bed) { return bed->dim == 3 ? 3 : 2; }
+
+/** Facet k of a cell as the surface lists it: the bed on the right of an edge, a face counter-clockwise from outside. */
+static inline void bed_facet(int dim, const int *cell, int k, int facet[3]) {
+    if (dim == 3) {
+        silt_cell_facet(3, cell, k, facet);
+        return;
+    }
+    facet[0] = cell[(k + 1) % 3];
+    facet[1] = cell[k];
+    facet[2] = -1;
+}
+/** the same facet from its other side */
+static inline void bed_facet_turned(const int facet[3], int turned[3]) {
+    turned[0] = facet[1];
+    turned[1] = facet[0];
+    turned[2] = facet[2];
+}
 
 /** twice the signed area of p, q, r */
 static inline double bed_cross(const double p[2], const double q[2], const double r[2]) {
     return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
 }
+/** six times the signed volume of p, q, r, s: positive where s sees p, q, r counter-clockwise */
+static inline double bed_volume6(const double *p, const double *q, const double *r, const double *s) {
+    double a[3], b[3], c[3];
+    for (int d = 0; d < 3; d++) {
+        a[d] = q[d] - p[d];
+        b[d] = r[d] - p[d];
+        c[d] = s[d] - p[d];
+    }
+    return (a[1] * b[2] - a[2] * b[1]) * c[0] + (a[2] * b[0] - a[0] * b[2]) * c[1] + (a[0] * b[1] - a[1] * b[0]) * c[2];
+}
 static inline double bed_distance(const double p[2], const double q[2]) {
     return hypot(q[0] - p[0], q[1] - p[1]);
+}
+/** the same in `dim` dimensions */
+static inline double bed_apart(int dim, const double *p, const double *q) {
+    const double flat = bed_distance(p, q);
+    return dim == 3 ? hypot(flat, q[2] - p[2]) : flat;
 }
 
 /** distance of x from the segment p-q */

@@ -399,7 +399,7 @@ static bool factor_coarsest(silt_coarse *c, const silt_level *a, const double *v
         }
     }
     start[a->n] = at;
-    silt_factor_analyse(&c->factor, FACTOR_DEFINITE, NULL);
+    silt_factor_analyse(&c->factor);
     SILT_RESERVE(c->work, c->work_capacity, a->n + 1);
     return silt_factor_compute(&c->factor);
 }

@@ -56,12 +56,12 @@ int *silt_factor_pattern(silt_factor *f, int n, int filled) {
     return q->matrix->p;
 }
 
-void silt_factor_analyse(silt_factor *f, silt_factor_kind kind, const int *order) {
+void silt_factor_analyse(silt_factor *f) {
     struct silt_factor_inside *q = f->inside;
-    q->common.method[0].ordering = order ? CHOLMOD_GIVEN : CHOLMOD_AMD;
-    q->common.supernodal = kind == FACTOR_DEFINITE ? CHOLMOD_AUTO : CHOLMOD_SIMPLICIAL; // supernodes have no D
+    q->common.method[0].ordering = CHOLMOD_AMD;
+    q->common.supernodal = CHOLMOD_AUTO;
     cholmod_free_factor(&q->factor, &q->common);
-    q->factor = cholmod_analyze_p(q->matrix, (int *)(uintptr_t)order, NULL, 0, &q->common);
+    q->factor = cholmod_analyze(q->matrix, &q->common);
 }
 
 bool silt_factor_compute(silt_factor *f) {
@@ -90,18 +90,4 @@ bool silt_factor_solve(silt_factor *f, const double *right, double *out) {
         return false;
     memcpy(out, q->solution->x, n * sizeof *out);
     return true;
-}
-
-int *silt_factor_order(int n, const int *start, const int *index) {
-    cholmod_common common;
-    cholmod_start(&common);
-    cholmod_sparse graph = {.nrow = (size_t)n, .ncol = (size_t)n, .nzmax = (size_t)start[n], .p = (void *)(uintptr_t)start,
-                            .i = (void *)(uintptr_t)index, .stype = -1, .itype = CHOLMOD_INT, .xtype = CHOLMOD_PATTERN,
-                            .dtype = CHOLMOD_DOUBLE, .sorted = 1, .packed = 1};
-    int *order = silt_alloc((size_t)n + 1, sizeof *order);
-    for (int k = 0; k < n; k++)
-        order[k] = k;
-    cholmod_amd(&graph, NULL, 0, order, &common);
-    cholmod_finish(&common);
-    return order;
 }

@@ -1,13 +1,11 @@
 /** @file factor.h
- * A sparse symmetric matrix, its order of elimination and its factor (CHOLMOD, one thread). The matrix is made in two goes: its
- * pattern when the mesh changes, its values as often as wanted.
+ * A sparse symmetric positive definite matrix, its order of elimination and its factor (CHOLMOD, one thread). The matrix is made in
+ * two goes: its pattern when the mesh changes, its values as often as wanted.
  */
 #ifndef SILT_FACTOR_H
 #define SILT_FACTOR_H
 
 #include "base.h"
-
-typedef enum { FACTOR_DEFINITE, FACTOR_QUASI_DEFINITE } silt_factor_kind;
 
 typedef struct silt_factor {
     int n;
@@ -20,15 +18,12 @@ typedef struct silt_factor {
 
 /** room for a new pattern of n rows and `filled` entries. @return start, to be filled in with index; value is 0 */
 int *silt_factor_pattern(silt_factor *factor, int n, int filled);
-/** chooses the order of elimination; order: n numbers, the first to be eliminated first (NULL: minimum degree).
- * Definite: L L^T, supernodal where that pays. Quasi-definite: L D L^T in the order given. */
-void silt_factor_analyse(silt_factor *factor, silt_factor_kind kind, const int *order);
-/** @return false when the matrix is not what its kind says: see `bad` */
+/** chooses the order of elimination, by minimum degree */
+void silt_factor_analyse(silt_factor *factor);
+/** L L^T, supernodal where that pays. @return false when the matrix is not positive definite: see `bad` */
 bool silt_factor_compute(silt_factor *factor);
 /** out = matrix^-1 right, which may be the same array */
 bool silt_factor_solve(silt_factor *factor, const double *right, double *out);
-/** minimum degree order of a graph, n numbers, owned by the caller. start, index: as a pattern's */
-int *silt_factor_order(int n, const int *start, const int *index);
 void silt_factor_clear(silt_factor *factor);
 
 #endif

@@ -2,9 +2,8 @@
 #include "fluid.h"
 
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
-#define FLUID_WHOLE 50.0    // the same, in the mean, from which momentum and continuity are factored as one: three passes fewer, but the factor
-                            // takes 31 us a node at 10k nodes, 440 at 40k
-#define FLUID_FACTOR 5.0     // the same, from which a factor of the momentum pays
+#define FLUID_WHOLE 4.0     // the same, in the mean, from which momentum and continuity are factored as one
+#define FLUID_SLOW 8         // passes after which stiff cells, few as they are, bring that too
 #define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
 #define EXPLICIT_SHARE 0.02 // of the water that may be too stiff for explicit viscosity: slivers
 #define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
@@ -518,10 +517,11 @@ static bool choose_theta(silt_fluid *f, const silt_step *s) {
     return f->theta > before;
 }
 
-// the momentum, or momentum and continuity as one system; once a step unless viscosity changes
+// The momentum, or momentum and continuity as one system: once a step, the latter in every pass where viscosity changes in all of them.
+// Conjugate gradients make up for what the momentum's factor is behind.
 static silt_status factor_stiff(silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
     silt_status status;
-    if (silt_stiff_ready(f->stiff, pressure) && !silt_viscosity_varies(s->scene))
+    if (silt_stiff_ready(f->stiff, pressure) && (!pressure || s->scene->fluid.rheology == RHEOLOGY_NEWTONIAN))
         return SILT_OK;
     SILT_CLOCKED(matrix, status = silt_stiff_factor(&f->stiff, f, s, pressure, err));
     return status;
@@ -604,10 +604,9 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             if (def->scheme == SCHEME_FRACTIONAL)
                 SILT_TRY(explicit_limit(f, s, err));
             silt_mobile_find(f, s->mesh, p);
-            const double mean = mean_stiffness(f, s);
-            whole = direct && mean > FLUID_WHOLE;
             // in the plane a stiff cell here and there is no reason
-            split = direct ? !whole && mean > FLUID_STIFF : stiffness(f, s) > FLUID_STIFF;
+            whole = direct && mean_stiffness(f, s) > FLUID_WHOLE;
+            split = !direct && stiffness(f, s) > FLUID_STIFF;
             SILT_CLOCKED(matrix, status = silt_pressure_factor(f->pressure, f, s, err));
             SILT_TRY(status);
             if (split)
@@ -626,7 +625,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             }
             resist(f, s);
         }
-        if (whole && stiffness(f, s) > FLUID_FACTOR)
+        if (whole)
             SILT_TRY(factor_stiff(f, s, false, err));
         if (f->iterations == 0 || !consistent)
             silt_assemble_projection(f, s->mesh, p);
@@ -642,7 +641,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
         // on the way the momentum is solved no further than it is worth; the iterate that ends it is solved out
-        const double drop = def->scheme == SCHEME_IMPLICIT && f->iterations && before > 10 * strict * def->tolerance ? 1e-3 : 0;
+        const double drop = def->scheme == SCHEME_IMPLICIT && before > 10 * strict * def->tolerance ? 1e-3 : 0;
         bool solved;
         SILT_TRY(velocity_star(f, s, stiff > 0, drop, &solved, err));
         int worst_node = star_continuity(f, s, p);
@@ -681,6 +680,10 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             return silt_fail(err, SILT_FAILED, "continuity did not converge: a node at (%g, %g) would still gain %.2g of its volume after %d iterations",
                              place[0], place[1], f->worst, f->iterations);
         before = f->worst;
+        if (direct && !whole && stiff > FLUID_STIFF && f->iterations == FLUID_SLOW) {
+            whole = true;
+            silt_mix_restart(&f->mix); // corrections of another kind
+        }
 
         memcpy(f->w, f->star, bytes);
         if (whole)
@@ -689,7 +692,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             SILT_TRY(pressure_increment(f, s, 0.01, err));
         if (!whole)
             correct(f, s, f->increment, f->w);
-        if (split || (stiff > FLUID_STIFF && !direct)) {
+        if (!direct && (split || stiff > FLUID_STIFF)) {
             SILT_TRY(prepare_stiff(f, s, &twofold, err)); // viscosity may have grown since the first iteration
             SILT_TRY(correct_stiff(f, err));
         }

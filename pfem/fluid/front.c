@@ -1,5 +1,8 @@
 // fronts: factor and solve
 #include <omp.h>
+#ifdef __SSE__
+#include <xmmintrin.h>
+#endif
 
 #include "front_inside.h"
 
@@ -153,9 +156,22 @@ typedef struct pass {
     void (*after)(const struct pass *pass, struct worker *w, struct branch *t);
 } pass;
 
+// What lies far apart couples by numbers that single precision holds as denormal, and a processor works at these many times as long: they
+// are taken for nought (five factors of momenta and saddle points at N = 0.4, 40k nodes: 59 -> 15 us a node).
+static void branch_work(const pass *p, void (*work)(const struct pass *, struct worker *, struct branch *), struct branch *t) {
+#ifdef __SSE__
+    const unsigned mode = _mm_getcsr();
+    _mm_setcsr(mode | _MM_FLUSH_ZERO_ON | 0x40); // 0x40: also where they come in
+#endif
+    work(p, &p->f->worker[omp_get_thread_num()], t);
+#ifdef __SSE__
+    _mm_setcsr(mode);
+#endif
+}
+
 static void branch_pass(const pass *p, struct branch *t) {
     if (p->before)
-        p->before(p, &p->f->worker[omp_get_thread_num()], t);
+        branch_work(p, p->before, t);
     int child = t->end - 2;
     for (int c = 0; t->top && c < p->f->block[t->begin].n_child; c++) {
         struct branch *other = branch_of(p->f, child);
@@ -165,7 +181,7 @@ static void branch_pass(const pass *p, struct branch *t) {
     }
 #pragma omp taskwait
     if (p->after)
-        p->after(p, &p->f->worker[omp_get_thread_num()], t);
+        branch_work(p, p->after, t);
 }
 
 static void all_pass(const pass *p) {

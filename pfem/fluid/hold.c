@@ -1,6 +1,7 @@
 // what surroundings hold: tank walls, bed, bodies, inlets; and the friction that they exert where water slides
 #include "fluid.h"
 
+#define BED_SQUARE 0.1  // cosine between a line of free motion and a wall that it may go along
 #define BED_FLUSH 0.866 // cosine of the largest turn, 30 degrees, between bed and a wall that goes on from it
 
 void silt_hold_project_held(const silt_fluid *f, int i, double *v) {
@@ -57,10 +58,37 @@ void silt_hold_bent(silt_fluid *f, const silt_step *s) {
     }
 }
 
-// normal of a facet into the water, as long as the facet
-static void facet_normal(const double *x, const int *facet, double n[2]) {
-    n[0] = -(x[2 * facet[1] + 1] - x[2 * facet[0] + 1]);
-    n[1] = x[2 * facet[1]] - x[2 * facet[0]];
+// normal of a facet into the water, as long as the edge, in space the face's area
+static void facet_normal(const silt_mesh *mesh, const double *x, const int *facet, double n[3]) {
+    if (mesh->dim != 3) {
+        n[0] = -(x[2 * facet[1] + 1] - x[2 * facet[0] + 1]);
+        n[1] = x[2 * facet[1]] - x[2 * facet[0]];
+        return;
+    }
+    double u[3], v[3];
+    for (int d = 0; d < 3; d++) {
+        u[d] = silt_shortest(mesh, d, x[3 * facet[1] + d] - x[3 * facet[0] + d]);
+        v[d] = silt_shortest(mesh, d, x[3 * facet[2] + d] - x[3 * facet[0] + d]);
+    }
+    for (int d = 0; d < 3; d++) // the facet is counter-clockwise from outside the water
+        n[d] = -0.5 * (u[(d + 1) % 3] * v[(d + 2) % 3] - u[(d + 2) % 3] * v[(d + 1) % 3]);
+}
+
+// In space the bed's node at a wall slides along the line that both leave free; a wall without slip, or a third one, holds it.
+static void hold_bed_line(silt_fluid *f, int i, bool sticks, const double *wall) {
+    double *n = f->normal + 3 * i, line[3];
+    if (f->hold[i] == HOLD_LINE) {
+        const double across = silt_dot(3, n, wall) / silt_length(3, wall);
+        if (sticks || fabs(across) > BED_SQUARE)
+            f->hold[i] = HOLD_ALL;
+        return;
+    }
+    for (int d = 0; d < 3; d++)
+        line[d] = n[(d + 1) % 3] * wall[(d + 2) % 3] - n[(d + 2) % 3] * wall[(d + 1) % 3];
+    const double length = silt_length(3, line);
+    f->hold[i] = sticks || !(length > 0) ? HOLD_ALL : HOLD_LINE;
+    for (int d = 0; d < 3 && f->hold[i] == HOLD_LINE; d++)
+        n[d] = line[d] / length;
 }
 
 // Slip on the bed ends where it meets something else that is shut: in a corner with a wall, where a node that slid on would go
@@ -69,45 +97,62 @@ static void facet_normal(const double *x, const int *facet, double n[2]) {
 static void hold_bed_ends(silt_fluid *f, const silt_step *s) {
     const silt_mesh *mesh = s->mesh;
     const uint8_t *kind = s->nodes->kind;
-    for (int k = 0; k < mesh->n_facet; k++)
-        for (int c = 0; c < 2; c++) {
-            const int i = mesh->facet[k][c], other = mesh->facet[k][1 - c];
-            if (kind[i] != NODE_BED || f->hold[i] != HOLD_NORMAL)
-                continue;
-            const bool slit = mesh->facet_kind[k] == FACET_FREE && kind[other] == NODE_BODY;
-            double n[2], *bed = f->normal + 2 * i;
-            facet_normal(s->nodes->x, mesh->facet[k], n);
-            const double turn = (n[0] * bed[0] + n[1] * bed[1]) / (silt_length(2, n) * silt_length(2, bed));
-            if (slit || (mesh->facet_kind[k] == FACET_WALL && !(turn > BED_FLUSH)))
-                f->hold[i] = HOLD_ALL;
-            else if (mesh->facet_kind[k] == FACET_WALL)
-                for (int d = 0; d < 2; d++)
-                    bed[d] += n[d];
-        }
+    const int D = f->dim;
+    // walls that go on from the bed first: the others are held against the whole normal
+    for (int pass = 0; pass < 2; pass++)
+        for (int k = 0; k < mesh->n_facet; k++)
+            for (int c = 0; c < D; c++) {
+                const int i = mesh->facet[k][c], other = mesh->facet[k][(c + 1) % D];
+                if (kind[i] != NODE_BED || (f->hold[i] != HOLD_NORMAL && f->hold[i] != HOLD_LINE))
+                    continue;
+                const bool slit = mesh->facet_kind[k] == FACET_FREE && kind[other] == NODE_BODY;
+                if (!slit && mesh->facet_kind[k] != FACET_WALL)
+                    continue;
+                double n[3], *bed = f->normal + D * i;
+                facet_normal(mesh, s->nodes->x, mesh->facet[k], n);
+                const double turn = silt_dot(D, n, bed) / (silt_length(D, n) * silt_length(D, bed));
+                if (slit || D == 2) {
+                    if (pass == 0 && (slit || !(turn > BED_FLUSH)))
+                        f->hold[i] = HOLD_ALL;
+                    else if (pass == 0)
+                        for (int d = 0; d < 2; d++)
+                            bed[d] += n[d];
+                    continue;
+                }
+                if (pass == 1 && (f->hold[i] == HOLD_LINE || !(turn > BED_FLUSH))) {
+                    double roughness;
+                    const bool sticks = silt_facet_condition(s->scene, s->walls, s->nodes, mesh, k, &roughness) == WALL_NO_SLIP;
+                    hold_bed_line(f, i, sticks, n);
+                } else if (pass == 0 && turn > BED_FLUSH)
+                    for (int d = 0; d < 3; d++)
+                        bed[d] += n[d];
+            }
 }
 
 // slip on the bed: the normal of its facets around the node
 static void hold_bed(silt_fluid *f, const silt_step *s) {
     const silt_mesh *mesh = s->mesh;
+    const int D = f->dim;
     for (int k = 0; k < mesh->n_facet; k++) {
         if (mesh->facet_kind[k] != FACET_BED)
             continue;
-        double n[2];
-        facet_normal(s->nodes->x, mesh->facet[k], n);
-        for (int c = 0; c < 2; c++) {
+        double n[3];
+        facet_normal(mesh, s->nodes->x, mesh->facet[k], n);
+        for (int c = 0; c < D; c++) {
             const int i = mesh->facet[k][c];
-            for (int d = 0; d < 2; d++)
-                f->normal[2 * i + d] += n[d];
+            for (int d = 0; d < D; d++)
+                f->normal[D * i + d] += n[d];
             f->hold[i] = HOLD_NORMAL;
         }
     }
     hold_bed_ends(f, s);
     for (int i = 0; i < f->n_node; i++)
         if (s->nodes->kind[i] == NODE_BED && f->hold[i] == HOLD_NORMAL) {
-            const double length = hypot(f->normal[2 * i], f->normal[2 * i + 1]);
+            double *n = f->normal + D * i;
+            const double length = D == 3 ? silt_length(3, n) : hypot(n[0], n[1]);
             if (length > 0) {
-                f->normal[2 * i] /= length;
-                f->normal[2 * i + 1] /= length;
+                for (int d = 0; d < D; d++)
+                    n[d] /= length;
             } else
                 f->hold[i] = HOLD_ALL;
         }

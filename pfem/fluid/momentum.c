@@ -1,8 +1,10 @@
-// the viscous momentum system, by conjugate gradients; where viscosity is stiff preconditioned by the factor of its first geometry
+// the viscous momentum system, by conjugate gradients; in the plane, where viscosity is stiff, preconditioned by a factor of the step's
 #include "fluid.h"
 #include "kernel.h"
 
 #define MOMENTUM_LIMIT 3000
+#define MOMENTUM_PATIENCE 20 // iterations of a solve after which a factor pays, in the plane: it costs as much as forty
+#define MOMENTUM_WORN 12     // iterations after which that of an earlier viscosity is made anew
 
 void silt_momentum_look(silt_fluid *f, const silt_mesh *mesh, const double *v) {
     memset(f->scratch, 0, (size_t)(f->dim * f->n_node) * sizeof *f->scratch);
@@ -120,21 +122,26 @@ KERNEL turn_chunk(const int D, silt_fluid *f, int first, int last, int c, const 
             s[D * i + d] = (z ? z[D * i + d] : r[D * i + d] / f->increment[i]) + beta * s[D * i + d];
 }
 
+// From diagonal to factor: directions start anew
+static silt_status descent_factor(silt_fluid *f, const silt_step *step, silt_descent *c, silt_error *err) {
+    silt_status status = SILT_OK;
+    if (!silt_stiff_ready(f->stiff, false))
+        SILT_CLOCKED(matrix, status = silt_stiff_factor(&f->stiff, f, step, false, err));
+    SILT_TRY(status);
+    silt_stiff_momentum(f->stiff, f, f->cg[0], f->cg[1]);
+    c->rz = silt_products(f->dim * f->n_node, f->cg[0], f->cg[1]);
+    return SILT_OK;
+}
+
 silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const double *right, double drop, double *v, bool *solved,
                                 silt_error *err) {
     const int n = f->n_node, D = f->dim;
-    const bool factored = silt_stiff_ready(f->stiff, false);
-    double *r = f->cg[0], *s = f->cg[1], *z = factored ? f->scratch : NULL;
+    double *r = f->cg[0], *z = NULL;
+    int worn = MOMENTUM_LIMIT;
     silt_descent c = begin(f, right, v, silt_clamp(1e-6 * step->scene->fluid.tolerance, 1e-12, 1e-9), drop);
-    if (factored && c.size > c.target) {
-        silt_stiff_momentum(f->stiff, f, r, s);
-        c.rz = silt_products(D * n, r, s);
-    }
     while (c.size > c.target) {
-        if (++c.iterations > MOMENTUM_LIMIT)
-            return silt_fail(err, SILT_FAILED, "the momentum system did not converge in %d iterations (%d nodes)", MOMENTUM_LIMIT, n);
         // the last step needs no product where viscosity is small: that it is enough is known beforehand
-        if (!factored && silt_square(c.bound) * c.size <= c.target) {
+        if (!z && silt_square(c.bound) * c.size <= c.target) {
             SILT_PARALLEL(n)
             for (int i = 0; i < n; i++)
                 for (int d = 0; d < D; d++)
@@ -142,9 +149,16 @@ silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const doub
             c.size *= silt_square(c.bound);
             break;
         }
+        if (!z && D == 2 && (c.iterations == MOMENTUM_PATIENCE || silt_stiff_ready(f->stiff, false))) {
+            SILT_TRY(descent_factor(f, step, &c, err));
+            z = f->scratch;
+            worn = c.iterations + MOMENTUM_WORN;
+        }
+        if (++c.iterations > MOMENTUM_LIMIT)
+            return silt_fail(err, SILT_FAILED, "the momentum system did not converge in %d iterations (%d nodes)", MOMENTUM_LIMIT, n);
         c.size = advance(f, c.rz / along(f, step->mesh), v);
         double fresh = c.size;
-        if (factored && c.size > c.target) {
+        if (z && c.size > c.target) {
             silt_stiff_momentum(f->stiff, f, r, z);
             fresh = silt_products(D * n, r, z);
         }
@@ -153,6 +167,8 @@ silt_status silt_momentum_solve(silt_fluid *f, const silt_step *step, const doub
         if (!isfinite(c.rz))
             return silt_fail(err, SILT_FAILED, "the momentum system gave numbers that are not finite");
     }
+    if (c.iterations > worn)
+        silt_stiff_end(f->stiff);
     f->momentum_iterations += c.iterations;
     *solved = c.size <= c.strict;
     return SILT_OK;

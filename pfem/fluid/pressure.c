@@ -79,7 +79,7 @@ static void column_laplacian(silt_pressure *p, const silt_fluid *f, const silt_m
 static silt_status system_factor(silt_system *system, const silt_step *s, bool fresh, silt_error *err) {
     bool done;
     if (fresh)
-        SILT_CLOCKED(analyse, silt_factor_analyse(&system->factor, FACTOR_DEFINITE, NULL));
+        SILT_CLOCKED(analyse, silt_factor_analyse(&system->factor));
     SILT_CLOCKED(factor, done = silt_factor_compute(&system->factor));
     if (done)
         return SILT_OK;

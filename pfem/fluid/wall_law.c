@@ -46,7 +46,7 @@ static int condition_of(const silt_scene *scene, const silt_walls *walls, const 
     switch (mesh->facet_kind[facet]) {
     case FACET_BED:
         if (scene->bed.condition == WALL_LAW)
-            *roughness = 2.5 * scene->grains.diameter;
+            *roughness = silt_bed_roughness(scene);
         return scene->bed.condition == WALL_DEFAULT ? WALL_NO_SLIP : (int)scene->bed.condition;
     case FACET_BODY:
         return WALL_NO_SLIP;

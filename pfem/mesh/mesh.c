@@ -160,8 +160,8 @@ silt_facet_kind silt_facet_kind_of(const silt_mesh *mesh, const silt_nodes *node
         return FACET_WALL;
     if (!silt_mesh_share(mesh, nodes, n_other, other))
         return FACET_FREE;
-    // an inlet's rim may lie in the second wall of a crease
-    for (int s = 0; s < (n_inlet ? 3 : 1) && nodes->wall[other[0]][s] >= 0; s++) {
+    // an inlet's rim, and in space that of the bed, may lie in the second wall of a crease
+    for (int s = 0; s < (n_inlet || (n_bed && dim == 3) ? 3 : 1) && nodes->wall[other[0]][s] >= 0; s++) {
         bool all = true;
         for (int k = 0; k < n_fixed && all; k++)
             all = facet_on_plane(mesh, nodes, fixed[k], other[0], nodes->wall[other[0]][s]);

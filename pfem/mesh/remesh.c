@@ -15,7 +15,7 @@ static bool polygon_contains(int n, const double *p, double x, double y) {
     return in;
 }
 
-bool silt_barrier_contains(const silt_barrier *barrier, const double point[2]) {
+bool silt_barrier_contains(const silt_barrier *barrier, const double *point) {
     int segment;
     if (barrier->walls && barrier->walls->count && silt_walls_distance(barrier->walls, point, &segment) < 0)
         return true;
@@ -93,10 +93,10 @@ bool silt_cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int
         return false;
     if (silt_mesh_share(mesh, nodes, mesh->dim + 1, cell))
         return true;
-    // in space also between nodes of an opening, and of the wall around it
+    // in space also between nodes of an opening or of the bed, and of the wall around it
     bool opening = false, free_facet = false;
     for (int a = 0; a < 4 && mesh->dim == 3; a++)
-        opening |= nodes->kind[cell[a]] == NODE_INLET || nodes->kind[cell[a]] == NODE_OPEN;
+        opening |= nodes->kind[cell[a]] == NODE_INLET || nodes->kind[cell[a]] == NODE_OPEN || nodes->kind[cell[a]] == NODE_BED;
     for (int a = 0; a < 4 && opening && !free_facet; a++) {
         int facet[3];
         silt_cell_facet(3, cell, a, facet);
@@ -395,7 +395,7 @@ static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, c
     return failed ? silt_fail(err, SILT_FAILED, "no memory for the triangulation of %d nodes", nodes->count) : SILT_OK;
 }
 
-static void draft_push(silt_draft *draft, const int cell[4], int before, double quality) {
+void silt_draft_push(silt_draft *draft, const int cell[4], int before, double quality) {
     silt_mesh *mesh = draft->mesh;
     SILT_RESERVE(mesh->cell, mesh->cell_capacity, mesh->n_cell + 1);
     SILT_RESERVE(draft->before, draft->before_capacity, mesh->n_cell + 1);
@@ -489,14 +489,22 @@ static void peel_slivers(silt_draft *draft, const silt_nodes *nodes, const uint8
 }
 
 // the chosen cells' neighbours; in 3-D slivers are taken off the surface and mended inside. @return flat cells left
-static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, const uint8_t *sliver, double size) {
+static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, uint8_t **sliver, const silt_bed *bed, double size) {
     silt_mesh *mesh = draft->mesh;
     SILT_RESERVE(mesh->across, mesh->across_capacity, mesh->n_cell + 1);
     silt_cells_across(mesh->dim, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
     if (mesh->dim != 3)
         return 0;
     int flat;
-    SILT_CLOCKED(heal, peel_slivers(draft, nodes, sliver); flat = silt_mesh_heal(draft, nodes, x, size));
+    const int before = mesh->n_cell, more = bed && bed->n_cell ? silt_mesh_fit_bed(draft, nodes, bed, size) : 0;
+    if (more) {
+        int capacity = before;
+        SILT_RESERVE(*sliver, capacity, mesh->n_cell);
+        memset(*sliver + before, 0, (size_t)more);
+        SILT_RESERVE(mesh->across, mesh->across_capacity, mesh->n_cell + 1);
+        silt_cells_across(3, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
+    }
+    SILT_CLOCKED(heal, peel_slivers(draft, nodes, *sliver); flat = silt_mesh_heal(draft, nodes, x, size));
     return flat;
 }
 
@@ -533,10 +541,10 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
             continue;
         SILT_RESERVE(sliver, sliver_capacity, mesh->n_cell + 1);
         sliver[mesh->n_cell] = flat;
-        draft_push(&draft, cell, -1, shape.height / h);
+        silt_draft_push(&draft, cell, -1, shape.height / h);
     }
     free(cells);
-    draft_finish(&draft, nodes, NULL, sliver, scene->fluid.size);
+    draft_finish(&draft, nodes, NULL, &sliver, barrier->bed, scene->fluid.size);
     free(sliver);
     draft_clear(&draft);
     silt_mesh_connect_known(mesh, nodes);
@@ -664,7 +672,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
             SILT_RESERVE(*sliver, sliver_capacity, mesh->n_cell + 1);
             (*sliver)[mesh->n_cell] = chosen[e] == CELL_SLIVER;
         }
-        draft_push(draft, cells[e], before[e], quality[e]);
+        silt_draft_push(draft, cells[e], before[e], quality[e]);
     }
     silt_mesh_clear(&gone);
     silt_locator_clear(&locator);
@@ -729,7 +737,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
         if (period <= 0 || 2 * largest <= margin || margin >= period)
             break;
     }
-    memory->flat = draft_finish(&draft, nodes, nodes->x, sliver, scene->fluid.size);
+    memory->flat = draft_finish(&draft, nodes, nodes->x, &sliver, barrier->bed, scene->fluid.size);
 
     uint8_t *was_wet = silt_alloc((size_t)nodes->count + 1, 1);
     for (int e = 0; e < memory->n_cell; e++)

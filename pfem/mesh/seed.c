@@ -346,6 +346,9 @@ static void seed_corners(seed *s) {
         for (int k = 0; k < n; k++) {
             const double *x = point + 3 * k;
             const bool corner = element[k][2] >= 0 || s->dim == 2 || !s->size;
+            // in space the bed has nodes of its own on them
+            if (s->dim == 3 && s->solid && s->solid(s->context, x, -1))
+                continue;
             if (corner == (pass == 0) && !seed_crowded(s, x, corner ? 1e-6 * s->h : 0.75 * seed_h(s, x)))
                 seed_add(s, NODE_CORNER, element[k][0], x);
         }
@@ -398,6 +401,8 @@ static bool seed_start(seed *s, silt_nodes *nodes, const silt_scene *scene, cons
     s->grid = silt_alloc((size_t)(s->bin[0] * s->bin[1] * s->bin[2]), sizeof *s->grid);
     seed_sort(s);
 
+    for (int i = 0; i < nodes->count; i++)
+        s->on_bed |= nodes->kind[i] == NODE_BED;
     silt_size_create(&s->size, scene, walls);
     if (!s->size)
         return true;
@@ -431,7 +436,9 @@ static void seed_velocity(seed *s, int first) {
     silt_nodes *nodes = s->nodes;
     const double g = silt_length(3, scene->gravity);
     for (int i = first; i < nodes->count; i++) {
-        if ((nodes->kind[i] != NODE_FLUID && nodes->kind[i] != NODE_OPEN) || scene->fluid.velocity.kind == FORMULA_NONE)
+        // water that slips on the bed moves with the rest
+        const bool slips = nodes->kind[i] == NODE_BED && scene->bed.condition != WALL_NO_SLIP;
+        if ((nodes->kind[i] != NODE_FLUID && nodes->kind[i] != NODE_OPEN && !slips) || scene->fluid.velocity.kind == FORMULA_NONE)
             continue;
         double v[3] = {0}, x[3] = {0};
         memcpy(x, nodes->x + s->dim * i, (size_t)s->dim * sizeof *x);

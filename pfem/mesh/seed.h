@@ -16,6 +16,7 @@ typedef struct seed {
     int dim;
     double h;        // m, fluid.size
     double period;   // m, 0: none
+    bool on_bed;     // nodes of a bed stand already: the water's grow from them
     // bins of nodes, each with the last node put there
     double lo[3], hi[3], width;
     int bin[3];

@@ -411,6 +411,17 @@ static void fill_lattice(seed *s, int region, bool rim) {
             }
 }
 
+// Boxes of one size in space; not where a bed reaches into them: a lattice would meet it anyhow.
+static bool region_has_lattice(const seed *s, int r) {
+    const silt_region *region = &s->scene->fluid.region[r];
+    if (region->kind != REGION_BOX || s->size)
+        return false;
+    for (int i = 0; i < s->nodes->count && s->on_bed; i++)
+        if (s->nodes->kind[i] == NODE_BED && silt_region_distance(region, 3, s->nodes->x + 3 * i) < -1e-6 * s->h)
+            return false;
+    return true;
+}
+
 void seed_fill_outline(seed *s, int r) {
     const silt_region *region = &s->scene->fluid.region[r];
     if (s->dim == 2) {
@@ -425,7 +436,7 @@ void seed_fill_outline(seed *s, int r) {
             fill_edge(s, r, point + 3 * k, point + 3 * ((k + 1) % n), NULL);
         return;
     }
-    if (region->kind == REGION_BOX && !s->size) {
+    if (region_has_lattice(s, r)) {
         fill_lattice(s, r, true);
         return;
     }
@@ -451,8 +462,7 @@ void seed_fill_outline(seed *s, int r) {
 }
 
 void seed_fill_region(seed *s, int r) {
-    const silt_region *region = &s->scene->fluid.region[r];
-    if (region->kind == REGION_BOX && s->dim == 3 && !s->size) {
+    if (s->dim == 3 && region_has_lattice(s, r)) {
         fill_lattice(s, r, false);
         return;
     }

@@ -33,6 +33,11 @@ static void draw_layout(silt_draw_canvas *c) {
     c->height = (int)lround((c->hi[1] - c->lo[1]) * c->scale);
 }
 
+// array that colours the grains, where there is no water to show it
+static const char *draw_grain_array(const silt_draw_canvas *c) {
+    return !c->scene->fluid.on && strcmp(c->field->name, "speed") == 0 ? c->field->water : NULL;
+}
+
 void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, int n_frame) {
     double wall_lo[2] = {HUGE_VAL, HUGE_VAL}, wall_hi[2] = {-HUGE_VAL, -HUGE_VAL};
     double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL};
@@ -51,9 +56,9 @@ void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, i
     for (int s = 0; s < samples; s++) {
         int number = entry[samples > 1 ? (int)((long)s * (n_frame - 1) / (samples - 1)) : 0].number;
         static const char *const part[] = {"fluid", "bed", "grains", "bodies"};
-        for (int k = 0; k < (c->slice ? 1 : 4); k++) {
+        for (int k = 0; k < (c->slice ? 2 : 4); k++) {
             silt_grid grid;
-            const char *array = k == 0 ? c->field->water : k == 1 ? c->field->bed : NULL;
+            const char *array = k == 0 ? c->field->water : k == 1 ? c->field->bed : k == 2 ? draw_grain_array(c) : NULL;
             if (!silt_draw_read(c, &grid, part[k], number, array))
                 continue;
             bool *counts = silt_alloc((size_t)grid.n_point + 1, sizeof *counts);
@@ -72,7 +77,7 @@ void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, i
             silt_draw_range(c, &grid, counts);
             free(counts);
             silt_grid_clear(&grid);
-            if (k == 1 && silt_grid_read(&grid, c->out, part[k], number, "CellData/density")) {
+            if (k == 1 && !c->slice && silt_grid_read(&grid, c->out, part[k], number, "CellData/density")) {
                 for (int i = 0; i < grid.n_cell; i++)
                     c->density = silt_max(c->density, grid.value ? grid.value[i] : 0);
                 silt_grid_clear(&grid);
@@ -197,7 +202,8 @@ static void draw_bed(silt_draw_canvas *c, int number) {
     silt_grid grid, cells;
     if (!silt_draw_read(c, &grid, "bed", number, c->field->bed))
         return;
-    bool dense = silt_grid_read(&cells, c->out, "bed", number, "CellData/density") && cells.value;
+    // a cut has other cells
+    bool dense = silt_grid_read(&cells, c->out, "bed", number, "CellData/density") && cells.value && !c->slice;
     cairo_surface_flush(c->surface);
     for (int i = 0; i < grid.n_cell; i++) {
         double density = dense && c->density > 0 ? cells.value[i] / c->density : 1;
@@ -215,12 +221,15 @@ static void draw_bed(silt_draw_canvas *c, int number) {
 
 static void draw_grains(silt_draw_canvas *c, int number) {
     silt_grid grid;
-    if (!silt_grid_read(&grid, c->out, "grains", number, NULL))
+    if (!silt_draw_read(c, &grid, "grains", number, draw_grain_array(c)))
         return;
     for (int i = 0; i < grid.n_point; i++) {
+        const silt_draw_colour speed = grid.value ? silt_draw_value(c, grid.value[i]) : (silt_draw_colour){0};
         double r = silt_max(1.2, c->scale * (grid.radius ? grid.radius[i] : 0));
         cairo_arc(c->cr, draw_x(c, grid.x[3 * i]), draw_y(c, grid.x[3 * i + 1]), r, 0, 2 * M_PI);
         silt_draw_ink(c->cr, 0xd9a441);
+        if (grid.value)
+            cairo_set_source_rgb(c->cr, speed.r, speed.g, speed.b);
         cairo_fill_preserve(c->cr);
         silt_draw_ink(c->cr, 0x5f4315);
         cairo_set_line_width(c->cr, silt_clamp(0.12 * r, 0.4, 1.2));
@@ -313,8 +322,8 @@ void silt_draw_flat(silt_draw_canvas *c, const silt_frame_entry *entry) {
     cairo_rectangle(c->cr, MARGIN_LEFT, MARGIN_TOP, c->width, c->height);
     cairo_clip(c->cr);
     draw_water(c, entry->number);
+    draw_bed(c, entry->number);
     if (!c->slice) {
-        draw_bed(c, entry->number);
         draw_grains(c, entry->number);
         draw_bodies(c, entry->number);
     }

@@ -277,6 +277,84 @@ static void space_water(space *s, int number) {
     }
 }
 
+// ---------------------------------------------------------------- bed
+
+/** a face of a cell of the bed: its corners rising, the corner opposite */
+typedef struct space_side {
+    int node[3], opposite;
+} space_side;
+
+static int compare_side(const void *p, const void *q) {
+    const int *a = ((const space_side *)p)->node, *b = ((const space_side *)q)->node;
+    for (int k = 0; k < 3; k++)
+        if (a[k] != b[k])
+            return a[k] < b[k] ? -1 : 1;
+    return 0;
+}
+
+// the faces of the bed's cells that no other cell has; out, owned by the caller. @return how many
+static int space_outside(const silt_grid *grid, space_side **out) {
+    space_side *side = silt_alloc(4 * (size_t)grid->n_cell + 1, sizeof *side);
+    int n = 0, kept = 0;
+    for (int i = 0; i < grid->n_cell; i++)
+        for (int k = 0; k < 4 && silt_grid_corners(grid, i) == 4; k++, n++) {
+            int *node = side[n].node, m = 0;
+            for (int a = 0; a < 4; a++) {
+                const int at = grid->link[grid->offset[i] + a];
+                int to = m;
+                if (a == k) {
+                    side[n].opposite = at;
+                    continue;
+                }
+                for (; to > 0 && node[to - 1] > at; to--)
+                    node[to] = node[to - 1];
+                node[to] = at;
+                m++;
+            }
+        }
+    qsort(side, (size_t)n, sizeof *side, compare_side);
+    for (int i = 0; i < n; i++)
+        if (i + 1 < n && compare_side(&side[i], &side[i + 1]) == 0)
+            i++;
+        else
+            side[kept++] = side[i];
+    *out = side;
+    return kept;
+}
+
+static void space_bed(space *s, int number) {
+    const silt_draw_colour sand = silt_draw_hex(0xcfae78), line = silt_draw_hex(0x8a6a3a);
+    const bool mesh = strcmp(s->c->field->name, "mesh") == 0;
+    silt_grid grid;
+    if (!silt_draw_read(s->c, &grid, "bed", number, s->c->field->bed))
+        return;
+    space_side *side;
+    const int n = space_outside(&grid, &side);
+    for (int i = 0; i < n; i++) {
+        space_face face = {.flat = sand, .coloured = grid.value != NULL, .plain = 0.62, .lit = 0.42};
+        double normal[3], in[3];
+        for (int k = 0; k < 3; k++)
+            face.x[k] = grid.x + 3 * side[i].node[k];
+        space_normal(face.x[0], face.x[1], face.x[2], normal);
+        space_unit(normal);
+        for (int d = 0; d < 3; d++)
+            in[d] = grid.x[3 * side[i].opposite + d] - face.x[0][d];
+        const double turn = space_dot(normal, in) > 0 ? -1 : 1;
+        for (int k = 0; k < 3; k++) {
+            for (int d = 0; d < 3; d++)
+                face.normal[k][d] = turn * normal[d];
+            face.value[k] = grid.value ? grid.value[side[i].node[k]] : 0;
+        }
+        if (space_dot(face.normal[0], s->eye) <= 0)
+            continue;
+        space_fill(s, &face);
+        for (int k = 0; k < 3 && mesh; k++)
+            space_line(s, face.x[k], face.x[(k + 1) % 3], 0.3 * space_lift(s), 1, line);
+    }
+    free(side);
+    silt_grid_clear(&grid);
+}
+
 // ---------------------------------------------------------------- axes
 
 // ticks and numbers along an edge of the room; they stand off to the side `away`
@@ -353,20 +431,22 @@ void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, 
     int samples = n_frame < DRAW_SAMPLES ? n_frame : DRAW_SAMPLES;
     for (int k = 0; k < samples; k++) {
         int number = entry[samples > 1 ? (int)((long)k * (n_frame - 1) / (samples - 1)) : 0].number;
-        silt_grid grid;
-        if (!silt_draw_read(c, &grid, "surface", number, c->field->water))
-            continue;
-        bool *counts = silt_alloc((size_t)grid.n_point + 1, sizeof *counts);
-        for (int i = 0; i < grid.n_point; i++) {
-            counts[i] = true;
-            for (int d = 0; d < 3; d++) {
-                lo[d] = silt_min(lo[d], grid.x[3 * i + d]);
-                hi[d] = silt_max(hi[d], grid.x[3 * i + d]);
+        for (int part = 0; part < 2; part++) {
+            silt_grid grid;
+            if (!silt_draw_read(c, &grid, part ? "bed" : "surface", number, part ? c->field->bed : c->field->water))
+                continue;
+            bool *counts = silt_alloc((size_t)grid.n_point + 1, sizeof *counts);
+            for (int i = 0; i < grid.n_point; i++) {
+                counts[i] = true;
+                for (int d = 0; d < 3; d++) {
+                    lo[d] = silt_min(lo[d], grid.x[3 * i + d]);
+                    hi[d] = silt_max(hi[d], grid.x[3 * i + d]);
+                }
             }
+            silt_draw_range(c, &grid, counts);
+            free(counts);
+            silt_grid_clear(&grid);
         }
-        silt_draw_range(c, &grid, counts);
-        free(counts);
-        silt_grid_clear(&grid);
     }
     // walls bound the room; upwards the water does, high empty tanks are cut
     const double room = lo[2] <= hi[2] ? hi[2] + 0.15 * (hi[2] - lo[2]) : HUGE_VAL;
@@ -426,6 +506,7 @@ void silt_draw_space(silt_draw_canvas *c, const silt_frame_entry *entry) {
     }
     if (c->walls && c->walls->corner)
         space_walls(&s, c->walls);
+    space_bed(&s, entry->number);
     space_water(&s, entry->number);
     space_show(&s);
     space_scales(&s);

@@ -257,7 +257,8 @@ static silt_status frame_bed(const char *out, int number, const silt_view *view,
     const silt_bed *bed = view->bed;
     size_t n = (size_t)bed->n_node, cells = (size_t)bed->n_cell;
     int *place = silt_alloc(n + 1, sizeof *place);
-    int64_t *link = silt_alloc(3 * cells + 1, sizeof *link), *offset = silt_alloc(cells + 1, sizeof *offset);
+    const int n_corner = bed->dim == 3 ? 4 : 3;
+    int64_t *link = silt_alloc(4 * cells + 1, sizeof *link), *offset = silt_alloc(cells + 1, sizeof *offset);
     uint8_t *type = silt_alloc(cells + 1, 1);
     double *x = silt_alloc(3 * n + 1, sizeof *x), *work = silt_alloc(n + 1, sizeof *work);
     double *shear = silt_alloc(n + 1, sizeof *shear), *density = silt_alloc(cells + 1, sizeof *density);
@@ -268,16 +269,15 @@ static silt_status frame_bed(const char *out, int number, const silt_view *view,
         if (!bed->alive[i])
             continue;
         place[i] = n_point;
-        x[3 * n_point] = bed->x[i][0];
-        x[3 * n_point + 1] = bed->x[i][1];
+        memcpy(x + 3 * n_point, bed->x[i], sizeof bed->x[i]);
         work[n_point] = bed->work[i];
         shear[n_point++] = bed->shear[i];
     }
     for (int i = 0; i < bed->n_cell; i++) {
-        for (int k = 0; k < 3; k++)
-            link[3 * i + k] = place[bed->cell[i][k]];
-        offset[i + 1] = 3 * (i + 1);
-        type[i] = VTK_TRIANGLE;
+        for (int k = 0; k < n_corner; k++)
+            link[n_corner * i + k] = place[bed->cell[i][k]];
+        offset[i + 1] = n_corner * (i + 1);
+        type[i] = n_corner == 4 ? VTK_TETRA : VTK_TRIANGLE;
         density[i] = bed->mass[i] / bed->area[i];
     }
 

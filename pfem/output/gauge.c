@@ -15,6 +15,7 @@ struct silt_gauges {
     double (*span)[2]; // owned, one per cell: part of a section in the cell
     int *span_cell;    // owned
     int main;          // lowest node of the largest group, -1
+    silt_heap heap;    // of grains
 };
 
 silt_status silt_gauges_create(silt_gauges **gauges, const silt_view *start, silt_error *err) {
@@ -24,7 +25,7 @@ silt_status silt_gauges_create(silt_gauges **gauges, const silt_view *start, sil
     g->start = silt_alloc((size_t)g->n_gauge + 1, sizeof *g->start);
     for (int i = 0; i < g->n_gauge; i++) {
         const silt_gauge_def *def = &start->scene->gauge[i];
-        g->start[i] = def->kind == GAUGE_SCOUR && start->bed ? silt_bed_level(start->bed, def->from[0]) : NAN;
+        g->start[i] = def->kind == GAUGE_SCOUR && start->bed ? silt_bed_level(start->bed, def->from) : NAN;
     }
     *gauges = g;
     return SILT_OK;
@@ -39,6 +40,7 @@ void silt_gauges_free(silt_gauges **gauges) {
     free(g->volume);
     free(g->span);
     free(g->span_cell);
+    silt_heap_clear(&g->heap);
     free(g);
     *gauges = NULL;
 }
@@ -58,6 +60,8 @@ int silt_gauge_columns(const silt_scene *scene, int i) {
     case GAUGE_FORCE:
     case GAUGE_CENTROID:
         return 3;
+    case GAUGE_GRAINS:
+        return 4;
     case GAUGE_ANGULAR:
         return scene->dimension == 3 ? 3 : 1;
     default:
@@ -69,7 +73,7 @@ void silt_gauge_column(const silt_scene *scene, int i, int k, char name[64]) {
     if (silt_gauge_columns(scene, i) == 1)
         snprintf(name, 64, "%.60s", scene->gauge[i].name);
     else
-        snprintf(name, 64, "%.60s_%c", scene->gauge[i].name, "xyz"[k]);
+        snprintf(name, 64, "%.60s_%c", scene->gauge[i].name, "xyzm"[k]);
 }
 
 int silt_gauges_count(const silt_scene *scene) {
@@ -480,6 +484,23 @@ static double gauge_discharge(silt_gauges *g, const silt_view *view, const silt_
     return flux;
 }
 
+// mean velocity by mass, and mass, of the grains in a box
+static void gauge_grains(const silt_view *view, const silt_gauge_def *def, double value[4]) {
+    const silt_grain_state *grains = view->grains;
+    double sum[4] = {0};
+    for (int k = 0; grains && k < grains->count; k++) {
+        bool inside = true;
+        for (int d = 0; d < view->scene->dimension; d++)
+            inside = inside && grains->x[3 * k + d] >= def->from[d] && grains->x[3 * k + d] <= def->to[d];
+        for (int d = 0; d < 3 && inside; d++)
+            sum[d] += grains->mass[k] * grains->v[3 * k + d];
+        sum[3] += inside ? grains->mass[k] : 0;
+    }
+    for (int d = 0; d < 3; d++)
+        value[d] = sum[3] > 0 ? sum[d] / sum[3] : NAN;
+    value[3] = sum[3];
+}
+
 // ---------------------------------------------------------------- all gauges
 
 static void gauge_water(silt_gauges *g, const silt_view *view, const silt_gauge_def *def, double *value) {
@@ -537,16 +558,23 @@ static void gauge_water(silt_gauges *g, const silt_view *view, const silt_gauge_
 }
 
 void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value) {
-    bool water = view->nodes && view->mesh && view->locator, connected = false;
+    bool water = view->nodes && view->mesh && view->locator, connected = false, heap = false;
     for (int i = 0; i < gauges->n_gauge; i++) {
         const silt_gauge_def *def = &view->scene->gauge[i];
         int n = silt_gauge_columns(view->scene, i);
         for (int k = 0; k < n; k++)
             value[k] = NAN;
         if (def->kind == GAUGE_BED_LEVEL || def->kind == GAUGE_SCOUR) {
-            double level = view->bed ? silt_bed_level(view->bed, def->from[0]) : -HUGE_VAL;
+            double level = view->bed ? silt_bed_level(view->bed, def->from) : -HUGE_VAL;
             if (level > -HUGE_VAL)
                 value[0] = def->kind == GAUGE_SCOUR ? gauges->start[i] - level : level;
+        } else if (def->kind == GAUGE_GRAIN_FRONT || def->kind == GAUGE_GRAIN_HEIGHT || def->kind == GAUGE_GRAIN_SLOPE) {
+            if (!heap)
+                silt_heap_find(&gauges->heap, view);
+            heap = true;
+            value[0] = silt_heap_gauge(&gauges->heap, view, def);
+        } else if (def->kind == GAUGE_GRAINS) {
+            gauge_grains(view, def, value);
         } else if (water) {
             if (!connected && (def->kind == GAUGE_FRONT || def->kind == GAUGE_HEIGHT || def->kind == GAUGE_EXTENT)) {
                 gauge_connect(gauges, view);

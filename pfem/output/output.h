@@ -39,6 +39,17 @@ void silt_gauges_free(silt_gauges **gauges);
 int silt_gauges_count(const silt_scene *scene);                        // number of history columns
 void silt_gauges_name(const silt_scene *scene, int column, char name[64]);
 void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value); // NaN where there is nothing to measure
+/** the grains that hang together, those with the most mass */
+typedef struct silt_heap {
+    int in_capacity, parent_capacity, mass_capacity;
+    uint8_t *in;  // owned, one per grain
+    int *parent;  // owned, groups of grains
+    double *mass; // owned, of a group at its lowest grain
+} silt_heap;
+void silt_heap_find(silt_heap *heap, const silt_view *view);
+/** front, height or slope of the heap that was found; NaN where there is none */
+double silt_heap_gauge(const silt_heap *heap, const silt_view *view, const silt_gauge_def *def);
+void silt_heap_clear(silt_heap *heap);
 /** what gauges keep from the start goes through checkpoints: after a resume create, then load */
 silt_status silt_gauges_save(const silt_gauges *gauges, silt_store *store, silt_error *err);
 silt_status silt_gauges_load(silt_gauges *gauges, silt_store *store, silt_error *err);

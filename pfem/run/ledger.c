@@ -90,15 +90,27 @@ void silt_run_ledger(silt_run *run) {
         silt_water_moment(nodes, &run->mesh, run->drag ? run->drag->solid : NULL, rho, (const double[3]){0}, ledger->angular_momentum);
     ledger->y_plus = run->fluid.law.n_point ? run->fluid.law.y_plus[1] : NAN;
     ledger->bed_mass = run->bed.solid_mass;
+    ledger->bed_shear = ledger->bed_work = 0;
+    for (int k = 0; k < run->bed.n_node; k++)
+        if (run->bed.exposed[k]) {
+            ledger->bed_shear = silt_max(ledger->bed_shear, run->bed.shear[k]);
+            ledger->bed_work = silt_max(ledger->bed_work, run->bed.work[k]);
+        }
+    ledger->bed_y_plus = run->bed.y_plus;
     ledger->pore_water_mass = run->bed.pore_water;
     ledger->grain_count = 0;
     ledger->grain_mass = 0;
     memset(ledger->grain_velocity, 0, sizeof ledger->grain_velocity);
+    ledger->grain_kinetic = ledger->grain_potential = 0;
     if (run->coupling) {
         const silt_grain_state *grains = silt_coupling_dem.grains(run->coupling);
         double moving = 0;
         for (int k = 0; k < grains->count; k++) {
+            const double *x = grains->x + 3 * k, *v = grains->v + 3 * k, *spin = grains->omega + 3 * k;
             moving += grains->mass[k];
+            ledger->grain_kinetic += 0.5 * grains->mass[k] *
+                                     (silt_dot(3, v, v) + 0.4 * silt_square(grains->radius[k]) * silt_dot(3, spin, spin));
+            ledger->grain_potential -= grains->mass[k] * silt_dot(3, x, scene->gravity);
             for (int d = 0; d < 3; d++)
                 ledger->grain_velocity[d] += grains->mass[k] * grains->v[3 * k + d];
         }

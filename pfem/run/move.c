@@ -166,6 +166,48 @@ static void expel(silt_run *run) {
     }
 }
 
+// Along the facet's edge: the water that stands at an end came from the other one. Adds to fresh.
+static void carry_edge(const silt_run *run, const int *facet, double *fresh) {
+    const silt_fluid *fluid = &run->fluid;
+    const double *v = run->nodes.v;
+    for (int c = 0; c < 2; c++) {
+        const int i = facet[c], up = facet[1 - c];
+        if (fluid->hold[i] != HOLD_NORMAL)
+            continue;
+        const double dx = run->x_old[2 * i] - run->x_old[2 * up], dy = run->x_old[2 * i + 1] - run->x_old[2 * up + 1];
+        const double share = run->dt * (fluid->w[2 * i] * dx + fluid->w[2 * i + 1] * dy) / (dx * dx + dy * dy);
+        for (int d = 0; d < 2 && share > 0; d++)
+            fresh[2 * i + d] += silt_min(share, 1) * (v[2 * up + d] - v[2 * i + d]);
+    }
+}
+
+// In space: where the water that stands at a corner was lies in the face, or it does not. Writes fresh.
+static void carry_face(const silt_run *run, const int *facet, double *fresh) {
+    const silt_fluid *fluid = &run->fluid;
+    const double *v = run->nodes.v;
+    for (int c = 0; c < 3; c++) {
+        const int i = facet[c], j = facet[(c + 1) % 3], k = facet[(c + 2) % 3];
+        if (fluid->hold[i] == HOLD_ALL)
+            continue;
+        double p[3], q[3];
+        for (int d = 0; d < 3; d++) {
+            p[d] = silt_shortest(&run->mesh, d, run->x_old[3 * j + d] - run->x_old[3 * i + d]);
+            q[d] = silt_shortest(&run->mesh, d, run->x_old[3 * k + d] - run->x_old[3 * i + d]);
+        }
+        // - w dt = a p + b q
+        const double *w = fluid->w + 3 * i, pp = silt_dot(3, p, p), qq = silt_dot(3, q, q), pq = silt_dot(3, p, q);
+        const double wp = -run->dt * silt_dot(3, w, p), wq = -run->dt * silt_dot(3, w, q), under = pp * qq - pq * pq;
+        double a = (qq * wp - pq * wq) / under, b = (pp * wq - pq * wp) / under;
+        if (!(a >= -1e-9 && b >= -1e-9))
+            continue;
+        const double most = silt_max(a + b, 1);
+        a = silt_max(a, 0) / most;
+        b = silt_max(b, 0) / most;
+        for (int d = 0; d < 3; d++)
+            fresh[3 * i + d] = v[3 * i + d] + a * (v[3 * j + d] - v[3 * i + d]) + b * (v[3 * k + d] - v[3 * i + d]);
+    }
+}
+
 // slip on the fixed nodes of the bed: the water that stands there now came from upstream along the surface
 static void carry_slip(silt_run *run) {
     if (!run->scene->bed.on || run->scene->bed.condition == WALL_NO_SLIP)
@@ -173,27 +215,19 @@ static void carry_slip(silt_run *run) {
     const silt_mesh *mesh = &run->mesh;
     const silt_fluid *fluid = &run->fluid;
     silt_nodes *nodes = &run->nodes;
+    const int D = silt_nodes_dim(nodes);
     double *fresh = run->fluid.scratch;
-    memcpy(fresh, nodes->v, 2 * (size_t)fluid->n_node * sizeof(double));
-    for (int k = 0; k < mesh->n_facet; k++) {
-        if (mesh->facet_kind[k] != FACET_BED)
+    memcpy(fresh, nodes->v, (size_t)(D * fluid->n_node) * sizeof(double));
+    for (int k = 0; k < mesh->n_facet; k++)
+        if (mesh->facet_kind[k] == FACET_BED)
+            (D == 3 ? carry_face : carry_edge)(run, mesh->facet[k], fresh);
+    for (int i = 0; i < fluid->n_node; i++) {
+        if (nodes->kind[i] != NODE_BED || (fluid->hold[i] != HOLD_NORMAL && fluid->hold[i] != HOLD_LINE))
             continue;
-        for (int c = 0; c < 2; c++) {
-            const int i = mesh->facet[k][c], up = mesh->facet[k][1 - c];
-            if (fluid->hold[i] != 1)
-                continue;
-            const double dx = run->x_old[2 * i] - run->x_old[2 * up], dy = run->x_old[2 * i + 1] - run->x_old[2 * up + 1];
-            const double share = run->dt * (fluid->w[2 * i] * dx + fluid->w[2 * i + 1] * dy) / (dx * dx + dy * dy);
-            for (int d = 0; d < 2 && share > 0; d++)
-                fresh[2 * i + d] += silt_min(share, 1) * (nodes->v[2 * up + d] - nodes->v[2 * i + d]);
-        }
+        const double *n = fluid->normal + D * i, along = silt_dot(D, fresh + D * i, n);
+        for (int d = 0; d < D; d++)
+            nodes->v[D * i + d] = fluid->hold[i] == HOLD_LINE ? along * n[d] : fresh[D * i + d] - along * n[d];
     }
-    for (int i = 0; i < fluid->n_node; i++)
-        if (nodes->kind[i] == NODE_BED && fluid->hold[i] == 1) {
-            const double *n = fluid->normal + 2 * i, vn = fresh[2 * i] * n[0] + fresh[2 * i + 1] * n[1];
-            for (int d = 0; d < 2; d++)
-                nodes->v[2 * i + d] = fresh[2 * i + d] - vn * n[d];
-        }
 }
 
 // A node that lands on a wall without slip stops at once, which no wall could do to it: the momentum along the wall stays in
@@ -224,13 +258,22 @@ static void hand_on_landing(silt_run *run, const int *wall_before, const double 
     }
 }
 
+// a bed cell in the numbers of the nodes; false where one of its corners never was on the surface
+static bool water_cell(const silt_run *run, const int *bed_cell, int cell[4]) {
+    for (int a = 0; a < 4; a++) {
+        cell[a] = bed_cell[a] < 0 ? -1 : run->bed.fluid_node[bed_cell[a]];
+        if (bed_cell[a] >= 0 && cell[a] < 0)
+            return false;
+    }
+    return true;
+}
+
 // bed cells that became water, and water that became bed, in the numbers of the nodes
 static void remember_bed(silt_run *run) {
     silt_memory *memory = &run->memory;
-    const int *node = run->bed.fluid_node;
     for (int k = 0; k < run->n_freed; k++) {
-        const int cell[4] = {node[run->freed[k][0]], node[run->freed[k][1]], node[run->freed[k][2]], -1};
-        if (cell[0] < 0 || cell[1] < 0 || cell[2] < 0)
+        int cell[4];
+        if (!water_cell(run, run->freed[k], cell))
             continue;
         SILT_RESERVE(memory->cell, memory->cell_capacity, memory->n_cell + 1);
         SILT_RESERVE(memory->area, memory->area_capacity, memory->n_cell + 1);
@@ -238,8 +281,8 @@ static void remember_bed(silt_run *run) {
         memory->area[memory->n_cell++] = run->freed_area[k];
     }
     for (int k = 0; k < run->n_grown; k++) {
-        const int cell[4] = {node[run->grown[k][0]], node[run->grown[k][1]], node[run->grown[k][2]], -1};
-        if (cell[0] < 0 || cell[1] < 0 || cell[2] < 0)
+        int cell[4];
+        if (!water_cell(run, run->grown[k], cell))
             continue;
         SILT_RESERVE(memory->taken, memory->taken_capacity, memory->n_taken + 1);
         SILT_RESERVE(memory->taken_area, memory->taken_area_capacity, memory->n_taken + 1);
@@ -296,7 +339,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
 
     // from here on positions are mended: what that does to the volume is booked by the rebuild
     for (int i = 0; i < n; i++) {
-        if (nodes->kind[i] == NODE_BED && run->fluid.hold[i] == 1)
+        if (nodes->kind[i] == NODE_BED && run->fluid.hold[i] != HOLD_ALL)
             memcpy(nodes->x + D * i, run->x_old + D * i, (size_t)D * sizeof(double));
         if (!mesh->wet[i] && nodes->kind[i] == NODE_FLUID)
             fly(run, i);

@@ -6,6 +6,7 @@
 #include "parallel.h"
 #include "run.h"
 
+#define BED_Y_PLUS 5.0     // largest height of the first cell in wall units: the viscous sublayer
 #define PRESSURE_SLOPE 0.2 // largest share by which output carries the pressure on to the end of the step
 
 static volatile sig_atomic_t run_asked, run_stop; // a signal asked for a checkpoint; SIGTERM came
@@ -214,11 +215,35 @@ static bool grains_again(silt_run *run, int64_t *n, int attempt, silt_error *err
     return true;
 }
 
+// a gradient that one cell spans is no gradient at the bed: told once a run
+static void bed_resolved(silt_run *run) {
+    if (run->bed_told || run->bed.y_plus <= BED_Y_PLUS)
+        return;
+    run->bed_told = true;
+    char *path = silt_text("%s/run.log", run->out);
+    FILE *log = fopen(path, "a");
+    for (int k = 0; k < 2; k++)
+        if (k == 0 ? !run->def.quiet : log != NULL)
+            fprintf(k == 0 ? stderr : log, "warning: t = %.6g s: the first cell over the bed is %.3g wall units high (y+), the gradient of bed.shear "
+                                           "needs at most %g: the shear is too low; finer water at the bed, or bed.shear: log-law\n",
+                    run->time, run->bed.y_plus, BED_Y_PLUS);
+    if (log)
+        fclose(log);
+    free(path);
+}
+
 static void bed_step(silt_run *run) {
     const double dt = silt_max(run->dt - run->wear_ahead, 0);
     run->wear_ahead = silt_max(run->wear_ahead - run->dt, 0);
-    if (run->scene->fluid.on && dt > 0)
-        silt_bed_wear(&run->bed, run->scene, &run->nodes, &run->mesh, &run->locator, dt);
+    if (run->scene->fluid.on && dt > 0) {
+        const silt_grain_state *grains = run->coupling && run->scene->bed.cover ? silt_coupling_dem.grains(run->coupling) : NULL;
+        double *cover = grains && grains->count ? silt_alloc((size_t)run->bed.n_node + 1, sizeof *cover) : NULL;
+        if (cover)
+            silt_bed_cover(&run->bed, run->scene, grains, cover);
+        silt_bed_wear(&run->bed, run->scene, &run->nodes, &run->mesh, &run->locator, cover, dt);
+        free(cover);
+    }
+    bed_resolved(run);
     silt_run_release(run);
 }
 

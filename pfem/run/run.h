@@ -10,7 +10,7 @@
 
 /** a parcel that has left the bed but has no room yet to stand in */
 typedef struct silt_waiting {
-    double x[2], normal[2], reach; // patch centre, out of the bed, how far out to look
+    double x[3], normal[3], reach; // patch centre, out of the bed, how far out to look
     double mass;                   // kg per m
 } silt_waiting;
 
@@ -48,14 +48,15 @@ struct silt_run {
     int n_rest, rest_capacity;
     silt_rest *rest;       // owned, rising id
     int n_freed, freed_capacity;
-    int (*freed)[3];       // owned, bed nodes of cells released in this step
+    int (*freed)[4];       // owned, bed nodes of cells released in this step
     int freed_area_capacity;
     double *freed_area;    // owned
     int n_grown, grown_capacity;
-    int (*grown)[3];       // owned, bed nodes of cells deposited in this step
+    int (*grown)[4];       // owned, bed nodes of cells deposited in this step
     int grown_area_capacity;
     double *grown_area;    // owned
     int64_t bed_revision;  // that nodes and coupling know
+    bool bed_told;         // that the shear on the bed is not resolved
     double wear_ahead;     // s, that the bed was worn for and the water has still to go: of steps cut after that
 
     // clocks: time = frame * output + offset, with offset = tick * step of the coupling when there is one

@@ -10,9 +10,11 @@
 #define RELEASE_FAR 12      // radii, the farthest that it looks
 #define RELEASE_HANGS -0.3  // upward part of the normal out of the bed below which sand does not hold
 
-static double gravity_of(const silt_scene *scene) { return hypot(scene->gravity[0], scene->gravity[1]); }
+static double gravity_of(const silt_scene *scene) {
+    return hypot(hypot(scene->gravity[0], scene->gravity[1]), scene->gravity[2]);
+}
 
-static void remember_cell(silt_run *run, const int cell[3], double area, bool freed) {
+static void remember_cell(silt_run *run, const int cell[4], double area, bool freed) {
     if (freed) {
         SILT_RESERVE(run->freed, run->freed_capacity, run->n_freed + 1);
         SILT_RESERVE(run->freed_area, run->freed_area_capacity, run->n_freed + 1);
@@ -45,7 +47,8 @@ static void release_node(silt_run *run, int node) {
 
     // equal parcels near the wanted size
     const double d = scene->grains.parcel, r_patch = silt_coupling_dem.parcel_radius(run->coupling, patch.mass);
-    const int n = (int)silt_max(1, floor(silt_square(2 * r_patch / d) + 0.5));
+    const double ratio = 2 * r_patch / d, most = silt_square(ratio) * (run->bed.dim == 3 ? ratio : 1);
+    const int n = (int)silt_max(1, floor(most + 0.5));
     for (int k = 0; k < n; k++) {
         SILT_RESERVE(run->waiting, run->waiting_capacity, run->n_waiting + 1);
         silt_waiting *waiting = &run->waiting[run->n_waiting++];
@@ -63,15 +66,16 @@ static void release_hanging(silt_run *run) {
     if (!(size > 0) || bed->n_node == 0)
         return;
     int *count = silt_alloc((size_t)bed->n_node, sizeof *count), hanging[RELEASE_MOST], n = 0;
+    const int dim = bed->dim == 3 ? 3 : 2;
     for (int e = 0; e < bed->n_edge; e++) {
-        const double *p = bed->x[bed->edge[e][0]], *q = bed->x[bed->edge[e][1]];
-        // the water is on the left
-        const double up = ((q[1] - p[1]) * g[0] - (q[0] - p[0]) * g[1]) / (hypot(q[0] - p[0], q[1] - p[1]) * size);
-        for (int c = 0; c < 2; c++)
+        double out[3] = {0};
+        silt_bed_facet_normal(bed, bed->edge[e], out);
+        const double up = -silt_dot(dim, out, g) / (hypot(hypot(out[0], out[1]), out[2]) * size);
+        for (int c = 0; c < dim; c++)
             count[bed->edge[e][c]] += up < RELEASE_HANGS ? 1 : -1000;
     }
     for (int k = 0; k < bed->n_node && n < RELEASE_MOST; k++)
-        if (count[k] >= 2)
+        if (count[k] >= dim)
             hanging[n++] = k;
     free(count);
     for (int k = 0; k < n; k++)
@@ -96,7 +100,7 @@ void silt_run_release(silt_run *run) {
             if (run->bed.alive[due[k]])
                 release_node(run, due[k]);
     }
-    if (isfinite(run->scene->bed.work))
+    if (silt_bed_erodes(&run->scene->bed))
         release_hanging(run);
     if (run->coupling && run->bed.revision != run->bed_revision) {
         silt_coupling_dem.bed_changed(run->coupling, &run->bed);
@@ -181,7 +185,7 @@ silt_status silt_run_deposit(silt_run *run, silt_error *err) {
     (void)err;
     const silt_scene *scene = run->scene;
     const silt_grain_state *grains = silt_coupling_dem.grains(run->coupling);
-    if (!scene->bed.on || !scene->bed.deposition || !isfinite(scene->bed.work))
+    if (!scene->bed.on || !scene->bed.deposition || !silt_bed_erodes(&scene->bed))
         return SILT_OK;
     const double g = gravity_of(scene);
     // the clocks of rest, merged by id
@@ -220,6 +224,60 @@ silt_status silt_run_deposit(silt_run *run, silt_error *err) {
     return SILT_OK;
 }
 
+// A node of the water that the bed gave free knows the walls that it lies on.
+static void touch_walls(silt_run *run, int i) {
+    silt_nodes *nodes = &run->nodes;
+    const double *x = nodes->x + 2 * i;
+    for (int s = 0, found = 0; s < run->walls.count && found < 2; s++) {
+        const double *from = run->walls.from[s], *to = run->walls.to[s], *n = run->walls.normal[s];
+        const double length = hypot(to[0] - from[0], to[1] - from[1]), tiny = 1e-6 * run->scene->fluid.size;
+        const double off = (x[0] - from[0]) * n[0] + (x[1] - from[1]) * n[1];
+        const double along = ((x[0] - from[0]) * (to[0] - from[0]) + (x[1] - from[1]) * (to[1] - from[1])) / length;
+        if (fabs(off) >= tiny || along <= -tiny || along >= length + tiny)
+            continue;
+        // nearly straight joints are no corners
+        const double *first = run->walls.normal[nodes->wall[i][0] < 0 ? s : nodes->wall[i][0]];
+        if (found == 0 || fabs(first[0] * n[1] - first[1] * n[0]) > 0.3)
+            nodes->wall[i][found++] = s;
+    }
+}
+
+// a node whose bed is gone is water now
+static void free_node(silt_run *run, int node) {
+    silt_bed *bed = &run->bed;
+    silt_nodes *nodes = &run->nodes;
+    if (bed->fluid_node[node] < 0)
+        bed->fluid_node[node] = silt_nodes_add(nodes, NODE_FLUID, -1, bed->x[node]);
+    const int i = bed->fluid_node[node];
+    if (nodes->kind[i] != NODE_BED && nodes->owner[i] != -1)
+        return;
+    nodes->kind[i] = bed->corner[node] >= 0 ? NODE_CORNER : NODE_FLUID;
+    nodes->owner[i] = bed->corner[node];
+    if (bed->dim != 3)
+        touch_walls(run, i);
+    else if (bed->corner[node] < 0)
+        memcpy(nodes->wall[i], bed->wall[node], sizeof nodes->wall[i]);
+}
+
+// water nodes too near to a new bed node leave
+static void clear_grown(silt_run *run) {
+    const silt_bed *bed = &run->bed;
+    const silt_nodes *nodes = &run->nodes;
+    const int dim = silt_nodes_dim(nodes);
+    silt_memory_extend(&run->memory, nodes->count);
+    for (int k = 0; k < run->n_grown; k++)
+        for (int a = 0; a <= dim; a++) {
+            const double *x = bed->x[run->grown[k][a]];
+            for (int i = 0; i < nodes->count; i++) {
+                if (nodes->kind[i] != NODE_FLUID || nodes->wall[i][1] >= 0)
+                    continue;
+                const double flat = hypot(nodes->x[dim * i] - x[0], nodes->x[dim * i + 1] - x[1]);
+                if ((dim == 3 ? hypot(flat, nodes->x[3 * i + 2] - x[2]) : flat) < 0.4 * run->scene->fluid.size)
+                    run->memory.dead[i] = 1;
+            }
+        }
+}
+
 void silt_run_bed_sync(silt_run *run) {
     if (!run->scene->bed.on || !run->scene->fluid.on)
         return;
@@ -227,32 +285,9 @@ void silt_run_bed_sync(silt_run *run) {
     silt_nodes *nodes = &run->nodes;
     // nodes of freed cells that have no bed left become water, and of grown cells that are new stand on the bed
     for (int k = 0; k < run->n_freed; k++)
-        for (int a = 0; a < 3; a++) {
-            const int node = run->freed[k][a];
-            if (bed->alive[node])
-                continue;
-            if (bed->fluid_node[node] < 0)
-                bed->fluid_node[node] = silt_nodes_add(nodes, NODE_FLUID, -1, bed->x[node]);
-            const int i = bed->fluid_node[node];
-            if (nodes->kind[i] != NODE_BED && nodes->owner[i] != -1)
-                continue;
-            nodes->kind[i] = NODE_FLUID;
-            nodes->owner[i] = -1;
-            // on a tank wall it stays on the wall
-            const double *x = nodes->x + 2 * i;
-            for (int s = 0, found = 0; s < run->walls.count && found < 2; s++) {
-                const double *from = run->walls.from[s], *to = run->walls.to[s], *n = run->walls.normal[s];
-                const double length = hypot(to[0] - from[0], to[1] - from[1]), tiny = 1e-6 * run->scene->fluid.size;
-                const double off = (x[0] - from[0]) * n[0] + (x[1] - from[1]) * n[1];
-                const double along = ((x[0] - from[0]) * (to[0] - from[0]) + (x[1] - from[1]) * (to[1] - from[1])) / length;
-                if (fabs(off) >= tiny || along <= -tiny || along >= length + tiny)
-                    continue;
-                // nearly straight joints are no corners
-                const double *first = run->walls.normal[nodes->wall[i][0] < 0 ? s : nodes->wall[i][0]];
-                if (found == 0 || fabs(first[0] * n[1] - first[1] * n[0]) > 0.3)
-                    nodes->wall[i][found++] = s;
-            }
-        }
+        for (int a = 0; a < 4; a++)
+            if (run->freed[k][a] >= 0 && !bed->alive[run->freed[k][a]])
+                free_node(run, run->freed[k][a]);
     for (int k = 0; k < bed->n_node; k++) {
         const int i = bed->fluid_node[k];
         if (bed->alive[k] && bed->exposed[k] && i < 0)
@@ -262,14 +297,5 @@ void silt_run_bed_sync(silt_run *run) {
             run->memory.dead[i] = 1; // buried
         }
     }
-    // water nodes too near to a new bed node leave
-    silt_memory_extend(&run->memory, nodes->count);
-    for (int k = 0; k < run->n_grown; k++)
-        for (int a = 0; a < 3; a++) {
-            const double *x = bed->x[run->grown[k][a]];
-            for (int i = 0; i < nodes->count; i++)
-                if (nodes->kind[i] == NODE_FLUID && nodes->wall[i][1] < 0 &&
-                    hypot(nodes->x[2 * i] - x[0], nodes->x[2 * i + 1] - x[1]) < 0.4 * run->scene->fluid.size)
-                    run->memory.dead[i] = 1;
-        }
+    clear_grown(run);
 }

@@ -1,15 +1,10 @@
 // the state at t = 0: box of the scene, bed, bodies, the cloud of nodes and the first mesh
 #include "run.h"
 
-static bool run_solid(const void *context, const double x[2], double margin) {
+static bool run_solid(const void *context, const double *x, double margin) {
     const silt_barrier *barrier = context;
-    if (barrier->bed) {
-        if (silt_bed_contains(barrier->bed, x))
-            return true;
-        for (int k = 0; k < barrier->bed->n_node; k++)
-            if (barrier->bed->exposed[k] && hypot(barrier->bed->x[k][0] - x[0], barrier->bed->x[k][1] - x[1]) < margin)
-                return true;
-    }
+    if (barrier->bed && (silt_bed_contains(barrier->bed, x) || silt_bed_near(barrier->bed, x, margin)))
+        return true;
     const silt_barrier bodies = {.bodies = barrier->bodies};
     if (silt_barrier_contains(&bodies, x))
         return true;
@@ -117,7 +112,7 @@ void silt_run_locate(silt_run *run) {
 silt_status silt_run_first(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     if (scene->bed.on)
-        SILT_TRY(silt_bed_create(&run->bed, scene, err));
+        SILT_TRY(silt_bed_create(&run->bed, scene, &run->walls, err));
     run->bed_revision = run->bed.revision;
     if (silt_scene_has_dem(scene)) {
         silt_coupling_def def;

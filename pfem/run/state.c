@@ -101,7 +101,7 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
     SILT_TRY(take_list(store, "sediment/rest", sizeof *run->rest, (void **)&run->rest, &run->n_rest, &run->rest_capacity, err));
 
     if (scene->bed.on)
-        SILT_TRY(silt_bed_load(&run->bed, store, err));
+        SILT_TRY(silt_bed_load(&run->bed, &run->walls, store, err));
     if (silt_scene_has_dem(scene)) {
         silt_coupling_def def;
         silt_coupling_def_fill(run, &def);

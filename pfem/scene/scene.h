@@ -170,23 +170,36 @@ typedef struct silt_fluid_def {
     silt_formula velocity; // initial
 } silt_fluid_def;
 
-typedef enum { BED_FRICTIONAL_WORK = 0, BED_DISSIPATION } silt_bed_law;
+typedef enum { BED_FRICTIONAL_WORK = 1, BED_DISSIPATION, BED_POWER, BED_EXCESS_SHEAR, BED_SHIELDS } silt_bed_law;
+typedef enum { SHEAR_DEFAULT = 0, SHEAR_PAPER, SHEAR_GRADIENT, SHEAR_LOG_LAW } silt_bed_shear;
 typedef struct silt_bed_def {
     bool on;
     double density;   // kg/m3 of the grains' solid, required
     double porosity;  // required
-    double work;      // J/m3, W_c, required; .inf: never erodes
-    silt_bed_law law; // law: frictional-work | dissipation
-    double distance;  // m, h_k, where the law frictional-work samples the velocity; default fluid.size
+    silt_bed_law law; // law: frictional-work | dissipation | power | excess-shear | shields
+    double work;      // J/m3, W_c of the first three laws, required; .inf: never erodes
+    double erodibility; // m3/(N s), k_d of excess-shear, required
+    double critical;  // critical Shields number of the law shields; 0: Soulsby and Whitehouse
+    silt_bed_shear shear; // how the stress on the bed is found; after reading never default
+    double distance;  // m, h_k, where shear: paper samples the velocity; default fluid.size
+    double roughness; // m, k_s of shear: log-law and of the wall law on the bed; 0: 2.5 grains.diameter
     double size;      // m, spacing of the bed's nodes; default fluid.size
     double layer;     // m, layer thickness h_0 that one W_c removes; 0: the patch height
-    double threshold; // Pa, shear stress below which no work is done; default 0
+    double threshold; // Pa, tau_c, shear stress below which nothing wears; default 0; of shields: from critical
+    double repose;    // degrees, angle of repose; 0: a bed that stands at any slope
+    bool slope;       // default true: with repose, the threshold hangs on the slope
+    bool cover;       // default true: what resting parcels cover does not wear
     double saturation; // share of the pores that holds water, default 1
     bool deposition;   // default true
     silt_condition condition; // of water on the bed, default no-slip
     int n_region;
     silt_region *region; // owned
 } silt_bed_def;
+
+/** true where water can wear the bed */
+static inline bool silt_bed_erodes(const silt_bed_def *bed) {
+    return bed->on && (bed->law > BED_POWER || isfinite(bed->work));
+}
 
 typedef enum {
     DRAG_NONE = 0,
@@ -286,6 +299,10 @@ typedef enum {
     GAUGE_FORCE,      // force_on: I: force of the water on wall I of the scene: columns NAME_x, NAME_y, NAME_z
     GAUGE_ANGULAR,    // angular_momentum_about: [x, y]; in 3-D columns NAME_x, NAME_y, NAME_z
     GAUGE_CENTROID,   // centroid_of: water: columns NAME_x, NAME_y, NAME_z
+    GAUGE_GRAIN_FRONT,  // grains_front: x | -x: the foremost x of the grains that hang together
+    GAUGE_GRAIN_HEIGHT, // grains_height_at: X (3-D: [x, y]): their top above that place
+    GAUGE_GRAIN_SLOPE,  // grains_slope: [x0, x1]: degrees by which it falls to the right, from x0 = from[0] to x1 = from[1]
+    GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
 } silt_gauge_kind;
 typedef struct silt_gauge_def {
@@ -387,6 +404,11 @@ void silt_series_constant(silt_series *series, double value); /**< a table of on
 int silt_series_column(const silt_series *series, const char *name); /**< column of that name, -1: none */
 /** What silt_series_at needs: two columns or more, finite numbers, column 0 strictly rising. The error names file and line. */
 silt_status silt_series_rising(const silt_series *series, silt_error *err);
+
+/** m, k_s of the bed */
+static inline double silt_bed_roughness(const silt_scene *s) {
+    return s->bed.roughness > 0 ? s->bed.roughness : 2.5 * s->grains.diameter;
+}
 
 /** all grains that are there at the start: the list's, then the regions' */
 static inline int silt_scene_grains(const silt_scene *s) { return s->grains.n_grain + s->grains.n_filled; }

@@ -15,7 +15,9 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     bool has_bodies = scene->n_body > 0;
     if (scene->dimension == 3) {
         // the others were refused already
-        bed = bodies = NULL;
+        bodies = NULL;
+        if (bed && grains)
+            silt_complain_key(reader, bed, "key 'bed': found it with grains, allowed without them in three dimensions so far (work: .inf)");
         if (!fluid)
             silt_complain(
                 reader, root,
@@ -24,9 +26,10 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
                       "one of fluid, grains, bodies");
-    if (bed && !grains)
+    const bool fixed = isinf(scene->bed.work) && !grains; // a bed that gives nothing needs no grains
+    if (bed && !grains && !fixed)
         silt_complain_key(reader, bed,
-                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}: "
+                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}, or with work: .inf: "
                           "eroded bed becomes grains");
     if (bed && scene->grains.on && !silt_tree_item(grains, "parcel"))
         silt_complain_key(reader, grains,
@@ -36,7 +39,7 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         silt_complain(reader, silt_tree_item(grains, "parcel"),
                       "key 'grains.parcel': found 0, allowed a number in m, > 0: "
                       "the bed's parcels need a diameter");
-    const silt_tree *first = bed ? bed : grains ? grains : has_bodies ? bodies : NULL;
+    const silt_tree *first = bed && !fixed ? bed : grains ? grains : has_bodies ? bodies : NULL;
     if (first && !silt_tree_item(root, "contact"))
         silt_complain_key(reader, first,
                           "key '%s': found it without contact properties, allowed with a block contact "
@@ -489,11 +492,16 @@ static const char *const check_fixed[] = {"step",
                                           "released_mass",
                                           "deposited_mass",
                                           "pore_water_mass",
+                                          "bed_shear",
+                                          "bed_work",
+                                          "bed_y_plus",
                                           "grain_count",
                                           "grain_mass",
                                           "grain_velocity_x",
                                           "grain_velocity_y",
                                           "grain_velocity_z",
+                                          "grain_kinetic_energy",
+                                          "grain_potential_energy",
                                           "grain_water_x",
                                           "grain_water_y",
                                           "grain_water_z",
@@ -739,6 +747,9 @@ static void check_gauges(silt_reader *reader, const silt_scene *scene) {
             silt_complain(reader, silt_tree_item(node, "force_on"),
                           "key 'gauges.%d.force_on': found %d, allowed the number of a wall, the first is 0; there are %d", i,
                           gauge->index, scene->n_wall);
+        const bool grains = gauge->kind == GAUGE_GRAIN_FRONT || gauge->kind == GAUGE_GRAIN_HEIGHT || gauge->kind == GAUGE_GRAIN_SLOPE;
+        if (grains && !scene->grains.on)
+            silt_complain(reader, node, "key 'gauges.%d': found a gauge of grains, allowed in a scene with a block grains", i);
         if (gauge->kind == GAUGE_EXTENT && gauge->from[0] == 2 && scene->dimension != 3)
             silt_complain(reader, silt_tree_item(node, "extent"),
                           "key 'gauges.%d.extent': found z, allowed x or y in two dimensions", i);

@@ -33,7 +33,11 @@ static const silt_word rheology_words[] = {{"newtonian", RHEOLOGY_NEWTONIAN},
 static const silt_word near_words[] = {{"region", NEAR_REGION}, {"walls", NEAR_WALLS},     {"bed", NEAR_BED},
                                        {"bodies", NEAR_BODIES}, {"surface", NEAR_SURFACE}, {0}};
 static const silt_word axis_words[] = {{"none", 0}, {"x", 1}, {"y", 2}, {"z", 3}, {0}};
-static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, {"dissipation", BED_DISSIPATION}, {0}};
+static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, {"dissipation", BED_DISSIPATION},
+                                      {"power", BED_POWER}, {"excess-shear", BED_EXCESS_SHEAR},
+                                      {"shields", BED_SHIELDS}, {0}};
+static const silt_word shear_words[] = {{"default", SHEAR_DEFAULT}, {"paper", SHEAR_PAPER}, {"gradient", SHEAR_GRADIENT},
+                                        {"log-law", SHEAR_LOG_LAW}, {0}};
 static const silt_word drag_words[] = {
     {"none", DRAG_NONE},       {"stokes", DRAG_STOKES},         {"schiller-naumann", DRAG_SCHILLER_NAUMANN}, {"abraham", DRAG_ABRAHAM},
     {"di-felice", DRAG_DI_FELICE}, {"ergun", DRAG_ERGUN},       {"wen-yu", DRAG_WEN_YU},
@@ -350,18 +354,37 @@ TABLE(wall, "a wall", silt_wall, offsetof(silt_wall, form));
 static const silt_key bed_rows[] = {
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_bed_def, density), .doc = "of the grains' solid"},
     {"porosity", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_bed_def, porosity), .doc = "share of pores"},
+    {"law", KEY_WORD, .flags = KEY_SELECTOR, .fallback = "frictional-work", .words = law_words, AT(silt_bed_def, law),
+     .doc = "how fast the water wears the bed; see docs/bed.md"},
     {"work", KEY_NUMBER, .unit = "J/m3", .flags = KEY_OPEN_LOW | KEY_INFINITE, RANGE(0, HUGE_VAL),
-     AT(silt_bed_def, work), .doc = "frictional work that loosens the bed; .inf: never"},
-    {"law", KEY_WORD, .fallback = "frictional-work", .words = law_words, AT(silt_bed_def, law),
-     .doc = "how the water's work on the bed is found"},
+     AT(silt_bed_def, work), .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION) | ONLY(BED_POWER),
+     .doc = "W_c, frictional work that loosens the bed; .inf: never. A constant of law, mesh and water, not of the soil: at a rate of "
+            "E m/s under tau it is h_b tau^2/(viscosity E), h_b the patch height; power: (tau - threshold) u*/E"},
+    {"erodibility", KEY_NUMBER, .unit = "m3/(N s)", POSITIVE, AT(silt_bed_def, erodibility), .when = ONLY(BED_EXCESS_SHEAR),
+     .doc = "k_d of E = k_d (tau - threshold); Hanson and Simon: 2e-7 threshold^-0.5"},
+    {"critical_shields", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, critical), .when = ONLY(BED_SHIELDS),
+     .doc = "Shields number at which grains begin to move; 0: Soulsby and Whitehouse for grains.diameter"},
+    {"shear", KEY_WORD, .fallback = "default", .words = shear_words, AT(silt_bed_def, shear),
+     .doc = "stress on the bed: viscosity v/(2 distance), viscosity times the gradient at the bed, or the law of a rough wall; default: "
+            "paper for frictional-work, gradient for dissipation, log-law for the others"},
     {"distance", KEY_NUMBER, .unit = "m", .fallback = "=fluid.size", POSITIVE, AT(silt_bed_def, distance),
-     .doc = "where the law frictional-work samples the velocity, along the normal"},
+     .doc = "where shear: paper samples the velocity, along the normal"},
+    {"roughness", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, roughness),
+     .doc = "equivalent sand roughness of the bed, for log-law and for condition: wall-law; 0: 2.5 grains.diameter"},
     {"size", KEY_NUMBER, .unit = "m", .fallback = "=fluid.size", POSITIVE, AT(silt_bed_def, size),
      .doc = "distance between the bed's nodes"},
     {"layer", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, layer),
+     .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION),
      .doc = "thickness that one `work` removes; 0: the height of the patch"},
     {"threshold", KEY_NUMBER, .unit = "Pa", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, threshold),
-     .doc = "shear stress below which no work is done"},
+     .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION) | ONLY(BED_POWER) | ONLY(BED_EXCESS_SHEAR),
+     .doc = "shear stress below which nothing wears, on level ground"},
+    {"repose", KEY_NUMBER, .unit = "degrees", .fallback = "0", .low = 0, .high = 80, AT(silt_bed_def, repose),
+     .doc = "angle of repose: what stands steeper falls as grains; 0: it stands at any slope, but not upside down"},
+    {"slope", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, slope),
+     .doc = "with repose, the threshold falls downhill and rises uphill"},
+    {"cover", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, cover),
+     .doc = "the part of the bed that parcels lie on does not wear"},
     {"saturation", KEY_NUMBER, .fallback = "1", RANGE(0, 1), AT(silt_bed_def, saturation),
      .doc = "share of the pores that holds water"},
     {"deposition", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, deposition),
@@ -371,7 +394,7 @@ static const silt_key bed_rows[] = {
     {"regions", KEY_LIST, .sub = &region_table, MANY(silt_bed_def, n_region, region),
      .doc = "where bed is at the start"},
     {0}};
-TABLE(bed, "the bed block", silt_bed_def, -1);
+TABLE(bed, "the bed block", silt_bed_def, offsetof(silt_bed_def, law));
 
 static const silt_key grain_rows[] = {
     {"at", KEY_POINT, .unit = "m", AT(silt_grain_def, at), .doc = "centre"},
@@ -479,12 +502,18 @@ static const silt_key gauge_rows[] = {
      .doc = "velocity there, columns NAME_x, NAME_y, NAME_z"},
     {"discharge", KEY_SEGMENT, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_DISCHARGE,
      AT(silt_gauge_def, from), .doc = "flow through the segment from its left to its right, m2/s"},
-    {"bed_level_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_BED_LEVEL,
-     AT(silt_gauge_def, from), .doc = "height of the bed at this x"},
-    {"scour_at", KEY_NUMBER, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_SCOUR,
-     AT(silt_gauge_def, from), .doc = "how deep the bed lies under its level at the start, at this x"},
+    {"bed_level_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_BED_LEVEL,
+     AT(silt_gauge_def, from), .doc = "height of the bed at this x (3-D: [x, y])"},
+    {"scour_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_SCOUR,
+     AT(silt_gauge_def, from), .doc = "how deep the bed lies under its level at the start, at this x (3-D: [x, y])"},
     {"extent", KEY_SIGN, .flags = KEY_CHOICE, .words = extent_words, .select = GAUGE_EXTENT, AT(silt_gauge_def, from),
      .doc = "length of connected water along this axis, m"},
+    {"grains_front", KEY_SIGN, .flags = KEY_CHOICE, .words = front_words, .select = GAUGE_GRAIN_FRONT, AT(silt_gauge_def, from),
+     .doc = "foremost x to this side of the heap: the grains that hang together, the most mass of them"},
+    {"grains_height_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_GRAIN_HEIGHT, AT(silt_gauge_def, from),
+     .doc = "top of the heap at this x (3-D: [x, y])"},
+    {"grains_slope", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_GRAIN_SLOPE, AT(silt_gauge_def, from),
+     .doc = "angle in degrees by which the top of the heap falls to the right, by least squares between these two x"},
     {"force_on", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(0, INT32_MAX), .select = GAUGE_FORCE,
      AT(silt_gauge_def, index),
      .doc = "force of the water on this wall of the list, from 0; columns NAME_x, NAME_y, NAME_z, N"},
@@ -493,6 +522,8 @@ static const silt_key gauge_rows[] = {
      .doc = "of the water about this point, kg m2/s; in three dimensions columns NAME_x, NAME_y, NAME_z"},
     {"centroid_of", KEY_SIGN, .flags = KEY_CHOICE, .words = water_words, .select = GAUGE_CENTROID,
      AT(silt_gauge_def, from), .doc = "centre of mass of the water, columns NAME_x, NAME_y, NAME_z, m"},
+    {"grains_in", KEY_BOX, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_GRAINS, AT(silt_gauge_def, from),
+     .doc = "of the grains in this box: mean velocity by mass, columns NAME_x, NAME_y, NAME_z, m/s, and their mass, NAME_m, kg (2-D: per metre of width)"},
     {0}};
 TABLE(gauge, "a gauge", silt_gauge_def, offsetof(silt_gauge_def, kind));
 
@@ -569,7 +600,7 @@ static const silt_key scene_rows[] = {
      .present = offsetof(silt_scene, fluid.on), AT(silt_scene, fluid), .doc = "the water"},
     {"walls", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &wall_table, MANY(silt_scene, n_wall, wall),
      .doc = "what holds it"},
-    {"bed", KEY_BLOCK, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &bed_table, .presence = PRESENT_FLAG,
+    {"bed", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &bed_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, bed.on), AT(silt_scene, bed), .doc = "ground that the water can erode"},
     {"grains", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &grains_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, grains.on), AT(silt_scene, grains), .doc = "loose grains; needed with a bed"},

@@ -341,6 +341,28 @@ static void settle_fluid(silt_reader *reader, silt_scene *scene) {
     settle_formula(reader, scene, &fluid->force, "fluid.body_force");
 }
 
+// bed --------------------------------------------------------------------------------------------------
+static void settle_bed(silt_reader *reader, silt_scene *scene) {
+    silt_bed_def *bed = &scene->bed;
+    const silt_tree *node = silt_tree_item(reader->root, "bed");
+    if (!bed->on || !node)
+        return;
+    const silt_tree *law = silt_tree_item(node, "law"), *shear = silt_tree_item(node, "shear");
+    const bool work = bed->law == BED_FRICTIONAL_WORK || bed->law == BED_DISSIPATION;
+    if (bed->shear == SHEAR_DEFAULT)
+        bed->shear = bed->law == BED_FRICTIONAL_WORK ? SHEAR_PAPER
+                     : bed->law == BED_DISSIPATION   ? SHEAR_GRADIENT
+                                                     : SHEAR_LOG_LAW;
+    if (scene->fluid.on && scene->fluid.viscosity == 0 && (bed->law == BED_SHIELDS || (work && bed->shear == SHEAR_LOG_LAW)))
+        silt_complain(reader, bed->law == BED_SHIELDS ? law : shear,
+                      "key 'bed.%s': found '%s' in water without viscosity, allowed with fluid.viscosity > 0",
+                      bed->law == BED_SHIELDS ? "law" : "shear", bed->law == BED_SHIELDS ? "shields" : "log-law");
+    if (scene->fluid.on && bed->law == BED_SHIELDS &&
+        (bed->density <= scene->fluid.density || silt_length(3, scene->gravity) == 0))
+        silt_complain(reader, law, "key 'bed.law': found 'shields' for a bed that has no weight in the water, allowed with gravity and "
+                                   "bed.density > fluid.density");
+}
+
 // grains that fill regions -----------------------------------------------------------------------------
 // the sieve's columns in this order, diameters > 0, shares that rise from 0 to 1
 static void settle_sieve(silt_reader *reader, const silt_tree *item, const char *path, silt_series *sieve) {
@@ -395,5 +417,6 @@ void silt_scene_settle(silt_reader *reader, silt_scene *scene) {
     for (int i = 0; i < scene->n_wall; i++)
         settle_wall(reader, scene, &scene->wall[i], i);
     settle_fluid(reader, scene);
+    settle_bed(reader, scene);
     settle_fills(reader, scene);
 }

@@ -36,7 +36,7 @@ static int warn_fluid(const silt_scene *scene, FILE *to) {
               "fluid.turbulence is a model of three-dimensional eddies; in two dimensions mixing-length is meant");
     warn_when(n_pulled, scene, to, &count,
               "%d walls slip and have a velocity along themselves, which does not reach the water", n_pulled);
-    warn_when(turbulent && scene->bed.on && scene->bed.condition == WALL_NO_SLIP && isfinite(scene->bed.work), scene, to,
+    warn_when(turbulent && scene->bed.on && scene->bed.condition == WALL_NO_SLIP && silt_bed_erodes(&scene->bed), scene, to,
               &count, "turbulent flow and bed.condition no-slip: the shear on the bed hangs on fluid.size; see wall-law");
     warn_when(fluid->shuffle > 0, scene, to, &count,
               "fluid.shuffle shifts nodes at random in every step: a test, no flow is better for it");
@@ -59,7 +59,7 @@ int silt_scene_warn(const silt_scene *scene, FILE *to) {
     }
     // parcels about as large as the patches that release them find room again; much smaller ones mostly fill pores
     const double parcel = scene->grains.parcel;
-    if (scene->bed.on && scene->grains.on && isfinite(scene->bed.work) && parcel > 0 &&
+    if (scene->bed.on && scene->grains.on && silt_bed_erodes(&scene->bed) && parcel > 0 &&
         (parcel < 0.3 * scene->bed.size || parcel > 1.2 * scene->bed.size)) {
         fprintf(to, "%s: warning: grains.parcel is %g of bed.size; 0.5 to 0.8 lets released parcels find room and come to rest as bed\n",
                 scene->path, parcel / scene->bed.size);

@@ -1,0 +1,178 @@
+// keeps the water's mesh on the bed in space: faces of the bed that the triangulation has lost
+
+#include "remesh.h"
+
+// A node close over a face of the bed is joined by the triangulation to nodes on the bed's other side, right through it. Such cells are
+// no water, and a hollow without pressure would stay on the face. It is filled by cells between faces and node.
+#define FIT_FLAT 0.002 // times h: flatter cells are left out
+
+/** a free facet with two nodes on the bed, from -> to as it lists them, and its third node */
+typedef struct fit_rim {
+    int from, to, apex;
+} fit_rim;
+
+/** a side of a face of the bed that is no facet of the water */
+typedef struct fit_side {
+    int from, to, face;
+} fit_side;
+
+typedef struct fit {
+    silt_draft *draft;
+    const silt_nodes *nodes;
+    int n_rim, rim_capacity, n_side, side_capacity, n_face, face_capacity;
+    fit_rim *rim;   // owned, sorted
+    fit_side *side; // owned, sorted
+    int (*face)[4]; // owned, the bed's faces that are missing, in the water's numbers, counter-clockwise seen from it; fourth -1
+    int *stack, *state; // owned, one per face: of the fill at work (state 1), filled (2)
+} fit;
+
+static int compare_three(const void *p, const void *q) {
+    const int *a = p, *b = q;
+    for (int k = 0; k < 3; k++)
+        if (a[k] != b[k])
+            return a[k] < b[k] ? -1 : 1;
+    return 0;
+}
+
+// free facets at the bed, and which of the bed's faces are facets of the water
+static void fit_collect(fit *f, const silt_bed *bed) {
+    const silt_mesh *mesh = f->draft->mesh;
+    int(*facet)[4] = NULL, n = 0, capacity = 0;
+    for (int e = 0; e < mesh->n_cell; e++)
+        for (int a = 0; a < 4; a++) {
+            if (mesh->across[e][a] >= 0)
+                continue;
+            int own[4] = {-1, -1, -1, -1}, n_bed = 0, other = 0;
+            silt_cell_facet(3, mesh->cell[e], a, own);
+            for (int k = 0; k < 3; k++) {
+                n_bed += f->nodes->kind[own[k]] == NODE_BED;
+                other = f->nodes->kind[own[k]] == NODE_BED ? other : k;
+            }
+            if (n_bed == 3) {
+                SILT_RESERVE(facet, capacity, n + 1);
+                memcpy(facet[n++], own, sizeof own);
+            } else if (n_bed == 2 && silt_facet_kind_of(mesh, f->nodes, own) == FACET_FREE) {
+                SILT_RESERVE(f->rim, f->rim_capacity, f->n_rim + 1);
+                f->rim[f->n_rim++] = (fit_rim){own[(other + 1) % 3], own[(other + 2) % 3], own[other]};
+            }
+        }
+    silt_cell_set set;
+    silt_cell_set_create(&set, f->nodes->count, n, (const int(*)[4])facet);
+    for (int k = 0; k < bed->n_edge && f->n_rim; k++) {
+        int face[4] = {-1, -1, -1, -1};
+        for (int a = 0; a < 3; a++)
+            face[a] = bed->fluid_node[bed->edge[k][a]];
+        if (face[0] < 0 || face[1] < 0 || face[2] < 0 || silt_cell_set_find(&set, face) >= 0)
+            continue;
+        SILT_RESERVE(f->face, f->face_capacity, f->n_face + 1);
+        memcpy(f->face[f->n_face], face, sizeof face);
+        SILT_RESERVE(f->side, f->side_capacity, f->n_side + 3);
+        for (int a = 0; a < 3; a++)
+            f->side[f->n_side++] = (fit_side){face[a], face[(a + 1) % 3], f->n_face};
+        f->n_face++;
+    }
+    silt_cell_set_clear(&set);
+    free(facet);
+    if (f->n_face) {
+        qsort(f->rim, (size_t)f->n_rim, sizeof *f->rim, compare_three);
+        qsort(f->side, (size_t)f->n_side, sizeof *f->side, compare_three);
+    }
+}
+
+// the first free facet that has from -> to, or -1
+static int fit_first(const fit *f, int from, int to) {
+    int lo = 0, hi = f->n_rim;
+    const int key[3] = {from, to, -1};
+    while (lo < hi) {
+        const int middle = (lo + hi) / 2;
+        if (compare_three(&f->rim[middle], key) < 0)
+            lo = middle + 1;
+        else
+            hi = middle;
+    }
+    return lo < f->n_rim && f->rim[lo].from == from && f->rim[lo].to == to ? lo : -1;
+}
+
+// the missing face that has from -> to, or -1
+static int fit_neighbour(const fit *f, int from, int to) {
+    int lo = 0, hi = f->n_side;
+    const int key[3] = {from, to, -1};
+    while (lo < hi) {
+        const int middle = (lo + hi) / 2;
+        if (compare_three(&f->side[middle], key) < 0)
+            lo = middle + 1;
+        else
+            hi = middle;
+    }
+    return lo < f->n_side && f->side[lo].from == from && f->side[lo].to == to ? f->side[lo].face : -1;
+}
+
+static silt_cell_shape fit_shape(const fit *f, int face, int apex) {
+    const int cell[4] = {f->face[face][0], f->face[face][1], f->face[face][2], apex};
+    double corner[12];
+    silt_cell_corners(f->draft->mesh, f->nodes->x, cell, corner);
+    return silt_cell_measure(3, corner);
+}
+
+// true when a free facet closes the fill there, or a wall does
+static bool fit_closed(const fit *f, int from, int to, int apex) {
+    const int facet[3] = {from, to, apex};
+    for (int k = fit_first(f, to, from); k >= 0 && k < f->n_rim && f->rim[k].from == to && f->rim[k].to == from; k++)
+        if (f->rim[k].apex == apex)
+            return true;
+    return silt_facet_kind_of(f->draft->mesh, f->nodes, facet) == FACET_WALL;
+}
+
+// The faces from `face` on that the hollow under `apex` lies on, into the stack. @return how many; 0: it does not close
+static int fit_flood(fit *f, int face, int apex, double size) {
+    int n = 1;
+    bool whole = true;
+    f->stack[0] = face;
+    f->state[face] = 1;
+    for (int top = 0; top < n && whole; top++) {
+        const int *own = f->face[f->stack[top]];
+        const silt_cell_shape shape = fit_shape(f, f->stack[top], apex);
+        const double h = silt_node_h(f->nodes, apex, size);
+        whole = shape.volume > 0 && shape.height > FIT_FLAT * h;
+        for (int a = 0; a < 3 && whole; a++) {
+            const int from = own[a], to = own[(a + 1) % 3], next = fit_neighbour(f, to, from);
+            if (fit_closed(f, from, to, apex) || (next >= 0 && f->state[next] == 1))
+                continue;
+            whole = next >= 0 && f->state[next] == 0;
+            if (whole) {
+                f->stack[n++] = next;
+                f->state[next] = 1;
+            }
+        }
+    }
+    for (int k = 0; k < n; k++)
+        f->state[f->stack[k]] = whole ? 2 : 0;
+    return whole ? n : 0;
+}
+
+int silt_mesh_fit_bed(silt_draft *draft, const silt_nodes *nodes, const silt_bed *bed, double size) {
+    fit f = {.draft = draft, .nodes = nodes};
+    const int before = draft->mesh->n_cell;
+    fit_collect(&f, bed);
+    f.stack = silt_alloc((size_t)f.n_face + 1, sizeof *f.stack);
+    f.state = silt_alloc((size_t)f.n_face + 1, sizeof *f.state);
+    for (int k = 0; k < f.n_face; k++)
+        for (int a = 0; a < 3 && f.state[k] == 0; a++) {
+            const int from = f.face[k][a], to = f.face[k][(a + 1) % 3];
+            for (int r = fit_first(&f, to, from); r >= 0 && r < f.n_rim && f.rim[r].from == to && f.rim[r].to == from; r++) {
+                const int n = fit_flood(&f, k, f.rim[r].apex, size);
+                for (int m = 0; m < n; m++) {
+                    const int *face = f.face[f.stack[m]], cell[4] = {face[0], face[1], face[2], f.rim[r].apex};
+                    silt_draft_push(draft, cell, -2, fit_shape(&f, f.stack[m], f.rim[r].apex).height / size);
+                }
+                if (n)
+                    break;
+            }
+        }
+    free(f.rim);
+    free(f.side);
+    free(f.face);
+    free(f.stack);
+    free(f.state);
+    return draft->mesh->n_cell - before;
+}
