@@ -46,12 +46,14 @@ EXCHANGE midpoint(const int D, const silt_exchange *e, double dt) {
 // nodes at the middle of the step, where the water's forces see them, for the velocity that was seen last
 static void exchange_midpoint(silt_exchange *e, double dt) { BY_DIM(e, midpoint, e, dt); }
 
-// corners of a cell from the first one, the shortest way across a periodic border
+// edges of a cell, from the first corner, the shortest way across a periodic border
 EXCHANGE edges(const int D, const silt_exchange *e, const double *x, const int *at, double edge[3][3]) {
     const double period = e->mesh->period[0];
-    for (int a = 0; a < D; a++) {
+    for (int a = 0; a < 3; a++) {
+        // in the plane the third one is that across from the first corner
+        const int from = at[D == 2 && a == 2 ? 1 : 0], to = at[D == 2 && a == 2 ? 2 : a + 1];
         for (int d = 0; d < D; d++)
-            edge[a][d] = x[D * at[a + 1] + d] - x[D * at[0] + d];
+            edge[a][d] = x[D * to + d] - x[D * from + d];
         if (period > 0.0)
             edge[a][0] -= period * floor(edge[a][0] / period + 0.5);
     }
@@ -64,6 +66,8 @@ EXCHANGE gradients(const int D, double u[3][3], double slope[4][3]) {
         slope[1][1] = -u[1][0] / 6.0;
         slope[2][0] = -u[0][1] / 6.0;
         slope[2][1] = u[0][0] / 6.0;
+        slope[0][0] = -u[2][1] / 6.0;
+        slope[0][1] = u[2][0] / 6.0;
     }
     for (int a = 0; a < 3 && D == 3; a++) {
         const double *p = u[(a + 1) % 3], *q = u[(a + 2) % 3];
@@ -95,11 +99,8 @@ EXCHANGE exchange_slope(const int D, const silt_exchange *e, const exchange_cell
             for (int d = 0; d < 3; d++)
                 slope[a][d] += more[a][d] / 3.0;
     }
-    for (int d = 0; d < D; d++) {
-        slope[0][d] = 0.0;
-        for (int a = 1; a <= D; a++)
-            slope[0][d] -= slope[a][d];
-    }
+    for (int d = 0; d < 3 && D == 3; d++)
+        slope[0][d] = -(slope[1][d] + slope[2][d] + slope[3][d]);
 }
 
 EXCHANGE smooth(const int D, silt_exchange *e, const double *water) {
