@@ -664,8 +664,7 @@ static void coupling_listed(silt_coupling *c) {
         g->diameter = def->diameter;
         g->number = 1.0 / c->width;
         g->fixed = coupling_fixes(c, g->id);
-        if (g->fixed)
-            memset(g->v, 0, sizeof g->v);
+        memset(g->v, 0, g->fixed ? sizeof g->v : 0);
     }
 }
 

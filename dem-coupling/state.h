@@ -94,9 +94,9 @@ struct silt_coupling {
     silt_error refused; // why a release cannot be; returned by the next start
 };
 
-/** grains.fixed holds the grain with this id: it is one of those of the start, which come first */
+/** the scene holds the grain with this id where it is: one of those of the start, whose ids come first */
 static inline bool coupling_fixes(const silt_coupling *c, int64_t id) {
-    return c->scene->grains.fixed && id <= silt_scene_grains(c->scene);
+    return id <= silt_scene_grains(c->scene) && silt_scene_grain(c->scene, (int)id - 1)->fixed;
 }
 
 /** mass of the sphere over the mass that it stands for in the slab: 1, more for a crumb; forces on it are scaled alike, so that it

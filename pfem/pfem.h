@@ -344,6 +344,10 @@ struct silt_bed {
     int *fluid_node;     // owned, index of the NODE_BED in silt_nodes, -1 while not exposed
     int (*wall)[3];      // owned, in space: elements of the walls that the node lies on, -1
     int *corner;         // owned, in space: the element that owns a corner of the walls where the node is one, -1
+    // of the water in its pores (seep.h), which owns them; NULL without seepage
+    const double *pressure; // Pa, per node
+    const double *seepage;  // per node, upward force of the seepage on the grains over their weight under water: 1 lifts them
+    const double *darcy;    // m/s, per cell, volume of water through the bed per area and time
     int n_cell, cell_capacity;
     int (*cell)[4];      // owned, counter-clockwise triangles, or tetrahedra of positive volume
     double *mass;        // owned, kg per m of width, solid mass of the cell
@@ -403,6 +407,9 @@ typedef struct silt_ledger {
     double initial_volume;    // water at the start
     double inflow_mass, outflow_mass;             // water, cumulative, kg
     double pore_water_mass;                       // released less taken up, cumulative, kg
+    double seepage;        // m3/s, what goes from the water into the bed (and comes out elsewhere), of the last step
+    double seepage_volume; // m3, the same, cumulative
+    double seepage_lost;   // m3, cumulative: came out of the bed where no water is to take it; part of outflow_mass
     double bed_mass, released_mass, deposited_mass, left_mass;      // sediment, cumulative, kg
     double bed_shear, bed_work, bed_y_plus;       // Pa, J/m3, largest on the bed's surface; see bed.y_plus
     double initial_sediment;

@@ -227,6 +227,43 @@ static void test_drop_under_lid(void **state) {
     end(&run, &scene);
 }
 
+// ---------------------------------------------------------------- the step's length
+
+// a bar of water in flight, with cells of 0.1 m: half a cell a step of what counts
+static void test_pace(void **state) {
+    (void)state;
+    silt_run run;
+    silt_scene *scene;
+    const char *set[] = {"fluid.regions.0.box=[[-1, -0.1, -0.1], [1, 0.1, 0.1]]", "fluid.jitter=0"};
+    begin(&run, &scene, "tests/scenes/space-thrown.yaml", 2, set);
+    double *v = run.nodes.v, square = 0;
+    int tip = 0;
+    for (int i = 0; i < run.nodes.count; i++) {
+        v[3 * i] = 1000;
+        v[3 * i + 1] = v[3 * i + 2] = 0;
+        tip = run.nodes.x[3 * i] > run.nodes.x[3 * tip] ? i : tip;
+    }
+    assert_float_equal(silt_run_pace(&run), 0.05 / 1000, 1e-12); // all as fast: none is spray
+    // a fast node among slow ones pulls its cells apart; as a drop in flight it may cross two cells
+    for (int i = 0; i < run.nodes.count; i++)
+        v[3 * i] = i == tip ? 1000 : 10;
+    assert_float_equal(silt_run_pace(&run), 0.05 / 1000, 1e-12);
+    run.mesh.wet[tip] = 0;
+    assert_float_equal(silt_run_pace(&run), 0.05 / 250, 1e-12);
+    run.mesh.wet[tip] = 1;
+    // spray that parts slowly: three times the largest difference between neighbours, at the tip
+    double next = 0;
+    for (int i = 0; i < run.nodes.count; i++) {
+        v[3 * i] = 1000 * pow(0.5 * (1 + run.nodes.x[3 * i]), 6);
+        square += silt_square(v[3 * i]) / run.nodes.count;
+        next = run.nodes.x[3 * i] < 0.92 ? silt_max(next, v[3 * i]) : next; // layers are half a cell apart, edges a cell long
+    }
+    const double apart = 1000 - next;
+    assert_true(2 * sqrt(square) < 3 * apart && 3 * apart < 1000);
+    assert_float_equal(silt_run_pace(&run), 0.05 / (3 * apart), 1e-12);
+    end(&run, &scene);
+}
+
 static void test_failed_step_water(void **state) {
     (void)state;
     fails_and_leaves("cases/dam-break/scene.yaml", 1, (const char *const[]){"fluid.size=0.006"}, 30, 10, false);
@@ -253,7 +290,7 @@ static void test_failed_step_thrown(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_water_alone),
-        cmocka_unit_test(test_drop_under_lid), cmocka_unit_test(test_failed_step_water),
+        cmocka_unit_test(test_drop_under_lid), cmocka_unit_test(test_pace), cmocka_unit_test(test_failed_step_water),
         cmocka_unit_test(test_failed_step_coupled),
         cmocka_unit_test(test_failed_step_prescribed),
         cmocka_unit_test(test_failed_step_thrown),

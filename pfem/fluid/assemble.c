@@ -207,9 +207,10 @@ KERNEL continuity(const int D, const silt_fluid *f, const silt_mesh *mesh, int e
 
 void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
                               const double *p) {
+    const double *taken = f->seep ? silt_seepage_taken(f, p) : NULL;
     SILT_PARALLEL(f->n_node)
     for (int j = 0; j < f->n_node; j++) {
-        const double asked = -(rate ? rate[j] : 0) - (drag ? drag->source[j] : 0);
+        const double asked = -(rate ? rate[j] : 0) - (drag ? drag->source[j] : 0) + (taken ? taken[j] : 0);
         f->residual[j] = f->mobile[j] == 1 ? asked : 0;
         f->withheld[j] = f->mobile[j] == 1 ? 0 : asked;
     }
@@ -217,6 +218,12 @@ void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_d
         BY_CELL(SUMS(1, f->withheld, f->residual), continuity, v, p, f->potential, f->share);
     else
         BY_CELL(SUMS(1, f->withheld, f->residual), continuity, v, p, NULL, NULL);
+    SILT_PARALLEL(f->n_node)
+    for (int j = 0; j < f->n_node; j++)
+        if (f->mobile[j] == MOBILE_SPRAY) { // its pressure is given: the smoothing's share is owed too
+            f->withheld[j] += f->residual[j];
+            f->residual[j] = 0;
+        }
 }
 
 KERNEL projection(const int D, const silt_fluid *f, const silt_mesh *mesh, int e, const silt_to to, const double *p, const double *potential) {

@@ -331,8 +331,7 @@ static int star_continuity(silt_fluid *f, const silt_step *s, const double *p) {
     return worst_residual(f, s);
 }
 
-// v += P G q / inertia
-static void correct(silt_fluid *f, const silt_step *s, const double *q, double *v) {
+void silt_fluid_correct(silt_fluid *f, const silt_step *s, const double *q, double *v) {
     const int D = f->dim;
     memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
     silt_assemble_pressure(f, s->mesh, q, f->scratch);
@@ -349,14 +348,18 @@ static void correct(silt_fluid *f, const silt_step *s, const double *q, double *
     }
 }
 
-// increment = -matrix^-1 residual, in 3-D to `tolerance`, or to what is worth having where the step is solved far
-static silt_status pressure_increment(silt_fluid *f, const silt_step *s, double tolerance, silt_error *err) {
+// increment = -matrix^-1 residual, in 3-D to `tolerance`, or to what is worth having where the step is solved far; seeps: it is a
+// pressure, which the bed answers, not an impulse or the way that debts are paid
+static silt_status pressure_increment(silt_fluid *f, const silt_step *s, bool seeps, double tolerance, silt_error *err) {
     silt_status status;
     SILT_PARALLEL(f->n_node)
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
     tolerance = silt_min(tolerance, FLUID_INNER * s->scene->fluid.tolerance);
-    SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, f->residual, tolerance, f->increment, err));
+    if (seeps && f->seep)
+        SILT_CLOCKED(solve, status = silt_seepage_solve(f, s, f->residual, tolerance, f->increment, err));
+    else
+        SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, f->residual, tolerance, f->increment, err));
     return status;
 }
 
@@ -382,8 +385,8 @@ static silt_status project_start(silt_fluid *f, const silt_step *s, const double
     const double before = kinetic_energy(f, s, v);
     // once: what is left is the smoothing's, and more of it makes the pressure rougher
     silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
-    SILT_TRY(pressure_increment(f, s, 1e-2, err));
-    correct(f, s, f->increment, v);
+    SILT_TRY(pressure_increment(f, s, false, 1e-2, err));
+    silt_fluid_correct(f, s, f->increment, v);
     f->projected = before - kinetic_energy(f, s, v);
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i])
@@ -405,8 +408,8 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
             silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
         for (int i = 0; i < f->n_node; i++)
             f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
-        SILT_TRY(pressure_increment(f, s, 0.03, err));
-        correct(f, s, f->increment, f->shift);
+        SILT_TRY(pressure_increment(f, s, false, 0.03, err));
+        silt_fluid_correct(f, s, f->increment, f->shift);
     }
     return SILT_OK;
 }
@@ -517,11 +520,11 @@ static bool choose_theta(silt_fluid *f, const silt_step *s) {
     return f->theta > before;
 }
 
-// The momentum, or momentum and continuity as one system: once a step, the latter in every pass where viscosity changes in all of them.
-// Conjugate gradients make up for what the momentum's factor is behind.
+// The momentum, or momentum and continuity as one system, once a step: passes make up for what viscosity has changed by since (mud that
+// collapses, 13 passes with a factor for each, 12.5 with one).
 static silt_status factor_stiff(silt_fluid *f, const silt_step *s, bool pressure, silt_error *err) {
     silt_status status;
-    if (silt_stiff_ready(f->stiff, pressure) && (!pressure || s->scene->fluid.rheology == RHEOLOGY_NEWTONIAN))
+    if (silt_stiff_ready(f->stiff, pressure))
         return SILT_OK;
     SILT_CLOCKED(matrix, status = silt_stiff_factor(&f->stiff, f, s, pressure, err));
     return status;
@@ -604,6 +607,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             if (def->scheme == SCHEME_FRACTIONAL)
                 SILT_TRY(explicit_limit(f, s, err));
             silt_mobile_find(f, s->mesh, p);
+            silt_spray_find(f, s, p);
             // in the plane a stiff cell here and there is no reason
             whole = direct && mean_stiffness(f, s) > FLUID_WHOLE;
             split = !direct && stiffness(f, s) > FLUID_STIFF;
@@ -640,8 +644,10 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         SILT_PARALLEL(f->n_node)
         for (int k = 0; k < D * f->n_node; k++)
             f->force[k] += f->excess[k];
-        // on the way the momentum is solved no further than it is worth; the iterate that ends it is solved out
-        const double drop = def->scheme == SCHEME_IMPLICIT && before > 10 * strict * def->tolerance ? 1e-3 : 0;
+        // on the way the momentum is solved no further than it is worth: what refreshes are taken from farther; the iterate that ends
+        // it is solved out
+        const double worth = f->iterations == 0 ? 1e-5 : refresh ? 1e-3 : 1e-2;
+        const double drop = def->scheme == SCHEME_IMPLICIT && before > 10 * strict * def->tolerance ? worth : 0;
         bool solved;
         SILT_TRY(velocity_star(f, s, stiff > 0, drop, &solved, err));
         int worst_node = star_continuity(f, s, p);
@@ -689,9 +695,9 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         if (whole)
             SILT_TRY(correct_whole(f, s, err));
         else
-            SILT_TRY(pressure_increment(f, s, 0.01, err));
+            SILT_TRY(pressure_increment(f, s, true, 0.01, err));
         if (!whole)
-            correct(f, s, f->increment, f->w);
+            silt_fluid_correct(f, s, f->increment, f->w);
         if (!direct && (split || stiff > FLUID_STIFF)) {
             SILT_TRY(prepare_stiff(f, s, &twofold, err)); // viscosity may have grown since the first iteration
             SILT_TRY(correct_stiff(f, err));
@@ -712,6 +718,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     fluid_reserve(f, s);
     silt_parts_make(&f->parts, s->mesh);
     const int D = f->dim;
+    f->seep = s->seep && s->seep->n_water ? s->seep : NULL;
     if (!f->pressure)
         f->pressure = silt_pressure_create();
     f->theta = def->theta;
@@ -753,10 +760,11 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         for (int i = 0; i < f->n_node; i++) {
             nodes->p[i] = p[i];
             f->solved_volume += f->residual[i] * s->dt;
-            nodes->debt[i] -= (f->rate[i] + (f->mobile[i] != 1 ? f->withheld[i] : 0)) * s->dt;
+            const double answered = (f->rate[i] + (f->mobile[i] != 1 ? f->withheld[i] : 0)) * s->dt;
+            nodes->debt[i] -= answered;
             if (def->pressure == PRESSURE_LAPLACIAN && s->mesh->surface[i]) // no continuity there: what the node gained
                 nodes->debt[i] -= f->residual[i] * s->dt;
-            f->given_back += f->rate[i] * s->dt;
+            f->given_back += answered;
             if (!s->mesh->wet[i])
                 continue;
             // what is held keeps its velocity, the rest goes on to the end of the step

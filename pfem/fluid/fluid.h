@@ -9,11 +9,14 @@
 
 #include "parts.h"
 #include "pocket.h"
+#include "seep.h"
 #include "viscosity.h"
 
 typedef struct silt_pressure silt_pressure; // the pressure matrix and its factor, pressure.c
 typedef struct silt_stiff silt_stiff;       // factors of momentum and continuity where viscosity is stiff, stiff.c
 typedef struct silt_mix silt_mix;           // the last iterates of a step, accelerate.c
+
+#define MOBILE_SPRAY 3 // silt_fluid.mobile: spray, at no pressure and without a say in its volume
 
 /** what a step sees */
 typedef struct silt_step {
@@ -22,6 +25,7 @@ typedef struct silt_step {
     const silt_mesh *mesh;
     const silt_drag *drag;       // NULL without grains in the water
     silt_pockets *pockets;       // NULL where air has no pressure
+    silt_seep *seep;             // prepared for this step; NULL where the bed lets no water through
     silt_nodes *nodes;
     double time, dt;             // s, start and length
 } silt_step;
@@ -55,7 +59,7 @@ typedef struct silt_fluid {
     double *projection, *projection_weight;    // owned, pressure gradient projection (dim per node) and its weight
     double *residual, *rate, *increment;       // owned, 1 per node
     uint8_t *hold;        // owned, silt_hold
-    uint8_t *mobile;      // owned, 1: some neighbour or the node itself can move; 2: but not so that its volume is kept
+    uint8_t *mobile;      // owned, 1: some neighbour or the node itself can move; 2: but not so that its volume is kept; MOBILE_SPRAY
     double *withheld;     // owned, per node, m3/s: gain that continuity does not see where mobile is not 1
     double *normal;       // owned, dim per node: silt_walls_hold's vector
     double *given;        // owned, dim per node, velocity of what is held
@@ -72,6 +76,7 @@ typedef struct silt_fluid {
     bool last_try;        // set by the caller: no smaller step will follow, what can be booked as debt shall not fail the step
     silt_pressure *pressure; // owned
     silt_stiff *stiff;    // owned
+    silt_seep *seep;      // the step's
     silt_mix *mix;        // owned
     double theta;         // implicitness of the step: fluid.theta, more where viscosity is stiff
     silt_depth depth;     // owned, distances to walls and surface; empty where viscosity is the same everywhere
@@ -88,7 +93,7 @@ typedef struct silt_fluid {
     double projected;         // J, kinetic energy that making the first velocity free of divergence took
     double impulse[3];        // N s, what that gave to the water (of walls, bed, bodies)
     double solved_volume;     // m3, sum of residual times dt
-    double given_back;        // m3, volume that the debts asked for
+    double given_back;        // m3, volume that the debts asked for, or that is booked as one
     double momentum_residual; // N, unbalanced force on free nodes
     double momentum_scale;    // N, what it is relative to
 } silt_fluid;
@@ -152,7 +157,7 @@ void silt_assemble_viscous_both(const silt_fluid *fluid, const silt_mesh *mesh, 
 void silt_assemble_viscous_diagonal(const silt_fluid *fluid, const silt_mesh *mesh, double *diagonal);
 /** out += (lumped - consistent mass) a */
 void silt_assemble_mass_excess(const silt_fluid *fluid, const silt_mesh *mesh, double density, const double *a, double *out);
-/** residual of continuity, p with the potential of a central force: G^T v + L p + Q pi - source - rate (NULL: 0); where no velocity can mend it, of its smoothing alone */
+/** residual of continuity, p with the potential of a central force: G^T v + L p + Q pi - source - rate (NULL: 0), and what the bed takes; where no velocity can mend it, of its smoothing alone */
 void silt_assemble_continuity(silt_fluid *fluid, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
                               const double *p);
 /** pi = -M^-1 Q^T p: the recovered gradient, lumped, of the pressure with the potential of a central force */
@@ -180,6 +185,8 @@ void silt_debts_ask(silt_fluid *fluid, const silt_step *step);
 bool silt_debts_relent(silt_fluid *fluid);
 /** a node whose whole surroundings are held has no say in its volume, nor have films and crumbs with a free node or two */
 void silt_mobile_find(silt_fluid *fluid, const silt_mesh *mesh, double *p);
+/** spray on the free surface, whose pressure is nought: mobile becomes MOBILE_SPRAY; after silt_mobile_find */
+void silt_spray_find(silt_fluid *fluid, const silt_step *step, double *p);
 /** which nodes may be let off: between held ones; also where little is missing; all */
 typedef enum { POCKET_HELD = 0, POCKET_LITTLE, POCKET_ANY } silt_pocket;
 /** nodes that no velocity keeps at their volume take the pressure around them. @return whether there was any */
@@ -208,6 +215,18 @@ silt_status silt_pressure_solve_stiff(silt_pressure *pressure, const double *rig
 /** forgets factors, so that a resumed run and one that went on hold the same */
 void silt_pressure_forget(silt_pressure *pressure);
 
+
+// fluid.c
+/** v += P G q/inertia */
+void silt_fluid_correct(silt_fluid *fluid, const silt_step *step, const double *q, double *v);
+
+// seepage.c -----------------------------------------------------------------------------------------------
+/** what the bed takes from each node at the pressure p, m3/s */
+const double *silt_seepage_taken(silt_fluid *fluid, const double *p);
+/** increment = (S + L + B)^-1 right, B what the bed takes of the water for its pressure: conjugate gradients with silt_pressure_solve
+ * before them, to `tolerance` relative to the right side. */
+silt_status silt_seepage_solve(silt_fluid *fluid, const silt_step *step, const double *right, double tolerance, double *increment,
+                               silt_error *err);
 
 // stiff.c -------------------------------------------------------------------------------------------------
 /** Assembles and factors the momentum, or momentum and continuity, of the present geometry and viscosity, 2-D. Makes *stiff at first. */

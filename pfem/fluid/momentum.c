@@ -3,7 +3,7 @@
 #include "kernel.h"
 
 #define MOMENTUM_LIMIT 3000
-#define MOMENTUM_PATIENCE 20 // iterations of a solve after which a factor pays, in the plane: it costs as much as forty
+#define MOMENTUM_PATIENCE 30 // iterations of a solve after which a factor pays, in the plane: it costs as much as that many
 #define MOMENTUM_WORN 12     // iterations after which that of an earlier viscosity is made anew
 
 void silt_momentum_look(silt_fluid *f, const silt_mesh *mesh, const double *v) {

@@ -9,6 +9,7 @@
 
 #define CG_LIMIT    400
 #define SPACE_STIFF 1e-3 // of the viscous part of an increment, which others mend
+#define SPACE_GIVEN 1e8  // times the diagonal: a pressure that is given gets no increment
 
 typedef float four __attribute__((vector_size(16))); // N_ij and L_ij of a node and its neighbour
 
@@ -161,7 +162,15 @@ static void rows_of_part(silt_space *q, const silt_fluid *f, const silt_mesh *me
             compact[self] += silt_dot(3, sum, sum);
         // a crumb between held nodes knows its pressure up to a constant too
         q->extra[i] = mesh->wet[i] ? (pinned[i] ? 1 : 1e-9) * compact[self] : 1;
+        if (f->mobile[i] == MOBILE_SPRAY)
+            q->extra[i] = SPACE_GIVEN * compact[self];
         compact[self] += q->extra[i];
+        if (stiff && f->mobile[i] == MOBILE_SPRAY)
+            q->stiff[first + self] *= SPACE_GIVEN;
+        // the preconditioner knows nothing of pressures that are given, or aggregates with one of them would stand still
+        for (int k = 0; k < count; k++)
+            if (k != self && (f->mobile[i] == MOBILE_SPRAY || f->mobile[mesh->neighbour[first + k]] == MOBILE_SPRAY))
+                compact[k] = 0;
     }
     free(row);
 }

@@ -16,7 +16,7 @@ static const unsigned draw_turn[] = {0x16345f, 0x2f6da8, 0x86b7d8, 0xf4f4f2, 0xe
 
 static const silt_draw_field draw_fields[] = {
     {"speed", "speed, m/s", "PointData/velocity", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
-    {"pressure", "pressure, Pa", "PointData/pressure", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
+    {"pressure", "pressure, Pa", "PointData/pressure", "PointData/pressure", MADE_LENGTH, DRAW_MAP(draw_map)},
     {"porosity", "porosity", "PointData/porosity", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
     {"elevation", "elevation, m", "PointData/pressure", NULL, MADE_ELEVATION, DRAW_MAP(draw_map)},
     {"vorticity", "vorticity, 1/s", "PointData/velocity", NULL, MADE_VORTICITY, DRAW_MAP(draw_turn)},

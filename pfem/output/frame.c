@@ -262,6 +262,9 @@ static silt_status frame_bed(const char *out, int number, const silt_view *view,
     uint8_t *type = silt_alloc(cells + 1, 1);
     double *x = silt_alloc(3 * n + 1, sizeof *x), *work = silt_alloc(n + 1, sizeof *work);
     double *shear = silt_alloc(n + 1, sizeof *shear), *density = silt_alloc(cells + 1, sizeof *density);
+    const bool seeps = bed->pressure != NULL;
+    double *pressure = silt_alloc(seeps ? n + 1 : 1, sizeof *pressure), *seepage = silt_alloc(seeps ? n + 1 : 1, sizeof *seepage);
+    double *darcy = silt_alloc(seeps ? 3 * cells + 1 : 1, sizeof *darcy);
 
     // living nodes only
     int n_point = 0;
@@ -271,6 +274,10 @@ static silt_status frame_bed(const char *out, int number, const silt_view *view,
         place[i] = n_point;
         memcpy(x + 3 * n_point, bed->x[i], sizeof bed->x[i]);
         work[n_point] = bed->work[i];
+        if (seeps) {
+            pressure[n_point] = bed->pressure[i];
+            seepage[n_point] = bed->seepage[i];
+        }
         shear[n_point++] = bed->shear[i];
     }
     for (int i = 0; i < bed->n_cell; i++) {
@@ -279,6 +286,8 @@ static silt_status frame_bed(const char *out, int number, const silt_view *view,
         offset[i + 1] = n_corner * (i + 1);
         type[i] = n_corner == 4 ? VTK_TETRA : VTK_TRIANGLE;
         density[i] = bed->mass[i] / bed->area[i];
+        for (int d = 0; d < n_corner - 1 && seeps; d++)
+            darcy[3 * i + d] = bed->darcy[(n_corner - 1) * i + d];
     }
 
     frame_file f;
@@ -287,6 +296,14 @@ static silt_status frame_bed(const char *out, int number, const silt_view *view,
     frame_put(&f, f.point, "work", H5T_NATIVE_DOUBLE, (size_t)n_point, 0, work);
     frame_put(&f, f.point, "shear", H5T_NATIVE_DOUBLE, (size_t)n_point, 0, shear);
     frame_put(&f, f.cell, "density", H5T_NATIVE_DOUBLE, cells, 0, density);
+    if (seeps) {
+        frame_put(&f, f.point, "pressure", H5T_NATIVE_DOUBLE, (size_t)n_point, 0, pressure);
+        frame_put(&f, f.point, "seepage", H5T_NATIVE_DOUBLE, (size_t)n_point, 0, seepage);
+        frame_put(&f, f.cell, "darcy", H5T_NATIVE_DOUBLE, cells, 3, darcy);
+    }
+    free(pressure);
+    free(seepage);
+    free(darcy);
     free(place);
     free(link);
     free(offset);

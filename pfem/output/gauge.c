@@ -528,7 +528,8 @@ static void gauge_water(silt_gauges *g, const silt_view *view, const silt_gauge_
             value[0] = 0;
             for (int k = 0; k < 4; k++)
                 value[0] += weight[k] * view->nodes->p[node[k]];
-        }
+        } else if (view->bed)
+            silt_seep_pressure_at(view->bed, def->from, value);
         break;
     case GAUGE_VELOCITY:
         if (gauge_point(view, def->from, node, weight)) {

@@ -16,7 +16,7 @@ struct silt_history {
 };
 
 // a ledger column and the part of the scene that it belongs to
-typedef enum { PART_FLUID, PART_LAW, PART_BED, PART_GRAINS, PART_FLOW } history_part;
+typedef enum { PART_FLUID, PART_LAW, PART_BED, PART_SEEPAGE, PART_GRAINS, PART_FLOW } history_part;
 typedef struct history_column {
     const char *name;
     history_part part;
@@ -56,6 +56,9 @@ static const history_column history_ledger[] = {
     {"bed_shear", PART_BED, offsetof(silt_ledger, bed_shear), false},
     {"bed_work", PART_BED, offsetof(silt_ledger, bed_work), false},
     {"bed_y_plus", PART_BED, offsetof(silt_ledger, bed_y_plus), false},
+    {"seepage", PART_SEEPAGE, offsetof(silt_ledger, seepage), false},
+    {"seepage_volume", PART_SEEPAGE, offsetof(silt_ledger, seepage_volume), false},
+    {"seepage_lost", PART_SEEPAGE, offsetof(silt_ledger, seepage_lost), false},
     {"grain_count", PART_GRAINS, offsetof(silt_ledger, grain_count), true},
     {"grain_mass", PART_GRAINS, offsetof(silt_ledger, grain_mass), false},
     {"grain_velocity_x", PART_GRAINS, offsetof(silt_ledger, grain_velocity[0]), false},
@@ -99,6 +102,8 @@ static bool history_has(const silt_scene *scene, history_part part) {
     }
     case PART_BED:
         return scene->bed.on;
+    case PART_SEEPAGE:
+        return silt_seep_on(scene);
     case PART_GRAINS:
         return scene->grains.on;
     case PART_FLOW:

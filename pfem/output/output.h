@@ -5,6 +5,7 @@
 #define SILT_OUTPUT_H
 
 #include "bed.h"
+#include "seep.h"
 
 #define SILT_PHASES(X) X(mesh) X(assemble) X(solve) X(bed) X(dem) X(move) X(output)
 typedef enum {

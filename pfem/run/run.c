@@ -131,6 +131,8 @@ static void water_restore(silt_run *run) {
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
     const silt_scene *scene = run->scene;
     water_keep(run);
+    if (silt_seep_on(scene))
+        SILT_TRY(silt_seep_prepare(&run->seep, &run->bed, scene, &run->nodes, &run->mesh, err));
     for (int attempt = 0;; attempt++) {
         silt_status status = SILT_OK;
         silt_walls_move(&run->walls, scene, run->time + run->dt, run->dt);
@@ -144,14 +146,18 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
         const silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
                                 .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
+                                .seep = silt_seep_on(scene) ? &run->seep : NULL,
                                 .nodes = &run->nodes, .time = run->time, .dt = run->dt};
         silt_clock_to(CLOCK_assemble);
         status = silt_fluid_step(&run->fluid, &step, err);
         silt_clock_to(CLOCK_rest);
         if (status == SILT_OK)
             status = silt_run_loads_sane(run, err);
-        if (status == SILT_OK)
+        if (status == SILT_OK) {
+            if (silt_seep_on(scene))
+                silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
             return SILT_OK;
+        }
         water_restore(run);
         const bool least = run->coupling && *n <= 1;
         if (attempt >= scene->time.retries || least) {
@@ -247,6 +253,18 @@ static void bed_step(silt_run *run) {
     silt_run_release(run);
 }
 
+// what went through the bed, and room for what it has become
+static void seepage_book(silt_run *run) {
+    silt_ledger *ledger = &run->ledger;
+    if (!silt_seep_on(run->scene))
+        return;
+    ledger->seepage = run->seep.entered;
+    ledger->seepage_volume += run->seep.entered * run->dt;
+    ledger->seepage_lost += run->seep.lost * run->dt;
+    ledger->outflow_mass += run->scene->fluid.density * run->seep.lost * run->dt;
+    silt_seep_fit(&run->seep, &run->bed, &run->nodes);
+}
+
 static silt_status run_step(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     silt_clock_reset();
@@ -296,6 +314,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     if (scene->fluid.on) {
         silt_wall_forces(&run->walls, &run->nodes, &run->mesh, run->fluid.reaction, run->wall_force);
         SILT_TRY(silt_run_move(run, err));
+        seepage_book(run);
         run->ledger.dissipation += run->fluid.dissipated;
         run->ledger.external_work += run->fluid.worked;
     }
@@ -408,6 +427,7 @@ void silt_run_free(silt_run *run) {
     silt_locator_clear(&run->locator);
     silt_nodes_clear(&run->nodes);
     silt_bed_clear(&run->bed);
+    silt_seep_clear(&run->seep);
     silt_walls_clear(&run->walls);
     silt_gauges_free(&run->gauges);
     silt_history_close(&run->history, NULL);

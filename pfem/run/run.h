@@ -38,6 +38,7 @@ struct silt_run {
     silt_pockets pockets;
     double (*wall_force)[3]; // owned, one per wall of the scene, N, of the water in the last step
     silt_bed bed;
+    silt_seep seep;          // empty where the bed lets no water through
     silt_coupling *coupling; // owned, NULL without grains and bodies
     const silt_drag *drag;   // borrowed from the coupling, NULL: no grain in the water
     silt_barrier barrier;

@@ -8,6 +8,7 @@
 #define RELEASE_MOST 64     // patches in one step
 #define RELEASE_LONG 4      // radii: a parcel that had to look farther goes up through the heap on it
 #define RELEASE_FAR 12      // radii, the farthest that it looks
+#define RELEASE_LIFTS 0.5   // upward part of the normal above which seepage can lift grains off
 #define RELEASE_HANGS -0.3  // upward part of the normal out of the bed below which sand does not hold
 
 static double gravity_of(const silt_scene *scene) {
@@ -83,6 +84,26 @@ static void release_hanging(silt_run *run) {
             release_node(run, hanging[k]);
 }
 
+// Seepage that outweighs the grains lifts them off: nodes on a surface that looks up, where its force is their weight under water
+static void release_lifted(silt_run *run) {
+    const silt_bed *bed = &run->bed;
+    const double *g = run->scene->gravity, size = gravity_of(run->scene);
+    if (!bed->seepage || !run->scene->bed.fluidise || !(size > 0))
+        return;
+    int lifted[RELEASE_MOST], n = 0;
+    for (int k = 0; k < run->seep.n_node && n < RELEASE_MOST; k++) {
+        double normal[3] = {0};
+        if (!bed->alive[k] || !bed->exposed[k] || bed->seepage[k] < 1)
+            continue;
+        silt_bed_normal(bed, k, normal);
+        if (-silt_dot(3, normal, g) > RELEASE_LIFTS * size)
+            lifted[n++] = k;
+    }
+    for (int k = 0; k < n; k++)
+        if (bed->alive[lifted[k]] && bed->exposed[lifted[k]])
+            release_node(run, lifted[k]);
+}
+
 void silt_run_release(silt_run *run) {
     if (!run->scene->bed.on)
         return;
@@ -94,6 +115,7 @@ void silt_run_release(silt_run *run) {
             continue;
         release_node(run, due[k]);
     }
+    release_lifted(run);
     if (run->bed.revision != run->bed_revision) {
         const int loose = silt_bed_loose(&run->bed, run->scene, RELEASE_MOST, due);
         for (int k = 0; k < loose; k++)

@@ -141,6 +141,8 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
         }
         free(point);
     }
+    if (silt_seep_on(scene))
+        silt_seep_fit(&run->seep, &run->bed, &run->nodes);
     for (int k = 0; k < run->bed.n_node; k++)
         if (run->bed.exposed[k])
             run->bed.fluid_node[k] = silt_nodes_add(&run->nodes, NODE_BED, k, run->bed.x[k]);

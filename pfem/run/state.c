@@ -52,6 +52,8 @@ silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
         status = silt_pockets_save(&run->pockets, store, err);
     if (status == SILT_OK && run->scene->bed.on)
         status = silt_bed_save(&run->bed, store, err);
+    if (status == SILT_OK && silt_seep_on(run->scene))
+        status = silt_seep_save(&run->seep, store, err);
     if (status == SILT_OK && run->coupling)
         status = silt_coupling_dem.save(run->coupling, store, err);
     if (status == SILT_OK)
@@ -102,6 +104,8 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
 
     if (scene->bed.on)
         SILT_TRY(silt_bed_load(&run->bed, &run->walls, store, err));
+    if (silt_seep_on(scene))
+        SILT_TRY(silt_seep_load(&run->seep, &run->bed, &run->nodes, store, err));
     if (silt_scene_has_dem(scene)) {
         silt_coupling_def def;
         silt_coupling_def_fill(run, &def);

@@ -144,7 +144,7 @@ static void fill_add(fill_state *f, const double *x, double radius) {
     silt_grains_def *grains = &f->scene->grains;
     SILT_RESERVE(grains->filled, grains->filled_capacity, grains->n_filled + 1);
     silt_grain_def *g = &grains->filled[grains->n_filled++];
-    *g = (silt_grain_def){.diameter = 2 * radius, .density = f->fill->density};
+    *g = (silt_grain_def){.diameter = 2 * radius, .density = f->fill->density, .fixed = f->fill->fixed};
     memcpy(g->at, x, (size_t)f->grid.dim * sizeof *x);
     memcpy(g->velocity, f->fill->velocity, sizeof g->velocity);
     grid_add(&f->grid, silt_scene_grains(f->scene) - 1, x);

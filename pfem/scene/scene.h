@@ -172,6 +172,7 @@ typedef struct silt_fluid_def {
 
 typedef enum { BED_FRICTIONAL_WORK = 1, BED_DISSIPATION, BED_POWER, BED_EXCESS_SHEAR, BED_SHIELDS } silt_bed_law;
 typedef enum { SHEAR_DEFAULT = 0, SHEAR_PAPER, SHEAR_GRADIENT, SHEAR_LOG_LAW } silt_bed_shear;
+typedef enum { SEEPAGE_NONE = 0, SEEPAGE_DARCY, SEEPAGE_KOZENY_CARMAN } silt_seepage;
 typedef struct silt_bed_def {
     bool on;
     double density;   // kg/m3 of the grains' solid, required
@@ -190,6 +191,9 @@ typedef struct silt_bed_def {
     bool slope;       // default true: with repose, the threshold hangs on the slope
     bool cover;       // default true: what resting parcels cover does not wear
     double saturation; // share of the pores that holds water, default 1
+    silt_seepage seepage; // seepage: none | darcy | kozeny-carman
+    double permeability;  // m2, with seepage: darcy
+    bool fluidise;     // seepage that outweighs the grains lifts them off the surface, default true
     bool deposition;   // default true
     silt_condition condition; // of water on the bed, default no-slip
     int n_region;
@@ -219,6 +223,7 @@ typedef struct silt_grain_def {
     double at[3], velocity[3];
     double diameter; // m
     double density;  // kg/m3
+    bool fixed;      // held where it is, default false
 } silt_grain_def;
 typedef enum { ARRANGE_RANDOM = 0, ARRANGE_LATTICE } silt_arrangement;
 /** a region full of grains at the start (fill.c) */
@@ -232,6 +237,7 @@ typedef struct silt_fill_def {
     int count;          // grains; 0: not given
     silt_arrangement arrangement;
     int seed;
+    bool fixed; // its grains are held where they are, default false
 } silt_fill_def;
 typedef struct silt_grains_def {
     bool on;              // true when the block is there; bodies alone need contact properties too: see contact
@@ -244,7 +250,6 @@ typedef struct silt_grains_def {
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false
     bool rotational_drag; // torque on the spin, default false
-    bool fixed;           // the grains of the start are held where they are, default false
     int n_grain;
     silt_grain_def *grain; // owned; key `list`
     int n_fill;

@@ -26,10 +26,10 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
                       "one of fluid, grains, bodies");
-    const bool fixed = isinf(scene->bed.work) && !grains; // a bed that gives nothing needs no grains
+    const bool fixed = !silt_bed_erodes(&scene->bed) && !grains; // a bed that gives nothing needs no grains
     if (bed && !grains && !fixed)
         silt_complain_key(reader, bed,
-                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}, or with work: .inf: "
+                          "key 'bed': found it without grains, allowed with a block grains {parcel: ...}, or one that gives nothing (work: .inf): "
                           "eroded bed becomes grains");
     if (bed && scene->grains.on && !silt_tree_item(grains, "parcel"))
         silt_complain_key(reader, grains,
@@ -52,6 +52,29 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     const silt_tree *regions = silt_tree_item(bed, "regions");
     if (regions && regions->kind == TREE_LIST && regions->n_item == 0)
         silt_complain(reader, regions, "key 'bed.regions': found an empty list, allowed at least one region");
+}
+
+// seepage has its law's number and water to flow in
+static void check_seepage(silt_reader *reader, const silt_scene *scene) {
+    const silt_bed_def *bed = &scene->bed;
+    const silt_tree *node = silt_tree_item(reader->root, "bed");
+    if (!bed->on)
+        return;
+    if (bed->seepage == SEEPAGE_DARCY && bed->permeability == 0)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.permeability': found none beside seepage: darcy, allowed a number in m2, > 0");
+    if (bed->seepage != SEEPAGE_DARCY && bed->permeability > 0)
+        silt_complain(reader, silt_tree_item(node, "permeability"),
+                      "key 'bed.permeability': found %.10g, allowed with seepage: darcy alone", bed->permeability);
+    if (bed->seepage != SEEPAGE_NONE && !scene->fluid.on)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.seepage': found it without water, allowed in a scene with fluid");
+    if (bed->seepage != SEEPAGE_NONE && scene->fluid.on && scene->fluid.viscosity == 0)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.seepage': found it beside fluid.viscosity: 0, allowed with a viscosity > 0");
+    if (bed->seepage != SEEPAGE_NONE && scene->fluid.on && scene->fluid.pressure == PRESSURE_LAPLACIAN)
+        silt_complain_key(reader, silt_tree_item(node, "seepage"),
+                          "key 'bed.seepage': found it beside fluid.pressure: laplacian, allowed consistent there");
 }
 
 // a number of frames that fits their names
@@ -459,66 +482,19 @@ typedef struct check_column {
 } check_column;
 
 // the same as in history.c; a test holds them together
-static const char *const check_fixed[] = {"step",
-                                          "time",
-                                          "dt",
-                                          "n_node",
-                                          "n_cell",
-                                          "fluid_volume",
-                                          "flying_volume",
-                                          "mesh_volume",
-                                          "fluid_mass",
-                                          "volume_error",
-                                          "kinetic_energy",
-                                          "potential_energy",
-                                          "momentum_x",
-                                          "momentum_y",
-                                          "momentum_z",
-                                          "momentum_error",
-                                          "external_work",
-                                          "dissipation",
-                                          "max_speed",
-                                          "volume_solved",
-                                          "volume_moved",
-                                          "volume_reconnected",
-                                          "volume_refined",
-                                          "volume_given",
-                                          "volume_owed",
-                                          "y_plus",
-                                          "angular_momentum_x",
-                                          "angular_momentum_y",
-                                          "angular_momentum_z",
-                                          "bed_mass",
-                                          "released_mass",
-                                          "deposited_mass",
-                                          "pore_water_mass",
-                                          "bed_shear",
-                                          "bed_work",
-                                          "bed_y_plus",
-                                          "grain_count",
-                                          "grain_mass",
-                                          "grain_velocity_x",
-                                          "grain_velocity_y",
-                                          "grain_velocity_z",
-                                          "grain_kinetic_energy",
-                                          "grain_potential_energy",
-                                          "grain_water_x",
-                                          "grain_water_y",
-                                          "grain_water_z",
-                                          "grain_contact_x",
-                                          "grain_contact_y",
-                                          "grain_contact_z",
-                                          "sediment_error",
-                                          "left_mass",
-                                          "inflow_mass",
-                                          "outflow_mass",
-                                          "wall_mesh",
-                                          "wall_assemble",
-                                          "wall_solve",
-                                          "wall_bed",
-                                          "wall_dem",
-                                          "wall_move",
-                                          "wall_output"};
+// clang-format off
+static const char *const check_fixed[] = {
+    "step", "time", "dt", "n_node", "n_cell", "fluid_volume", "flying_volume", "mesh_volume", "fluid_mass",
+    "volume_error", "kinetic_energy", "potential_energy", "momentum_x", "momentum_y", "momentum_z", "momentum_error",
+    "external_work", "dissipation", "max_speed", "volume_solved", "volume_moved", "volume_reconnected",
+    "volume_refined", "volume_given", "volume_owed", "y_plus", "angular_momentum_x", "angular_momentum_y",
+    "angular_momentum_z", "bed_mass", "released_mass", "deposited_mass", "pore_water_mass", "bed_shear", "bed_work",
+    "bed_y_plus", "seepage", "seepage_volume", "seepage_lost", "grain_count", "grain_mass", "grain_velocity_x",
+    "grain_velocity_y", "grain_velocity_z", "grain_kinetic_energy", "grain_potential_energy", "grain_water_x",
+    "grain_water_y", "grain_water_z", "grain_contact_x", "grain_contact_y", "grain_contact_z", "sediment_error",
+    "left_mass", "inflow_mass", "outflow_mass", "wall_mesh", "wall_assemble", "wall_solve", "wall_bed", "wall_dem",
+    "wall_move", "wall_output"};
+// clang-format on
 static const char *const check_of_body[] = {"x",  "y",  "z",  "vx", "vy", "vz", "qw", "qx", "qy", "qz", "wx",
                                             "wy", "wz", "fx", "fy", "fz", "tx", "ty", "tz", "cx", "cy", "cz"};
 enum {
@@ -759,6 +735,7 @@ static void check_gauges(silt_reader *reader, const silt_scene *scene) {
 void silt_scene_check(silt_reader *reader, silt_scene *scene) {
     check_blocks(reader, scene);
     check_time(reader, scene);
+    check_seepage(reader, scene);
     check_tension(reader, scene);
     check_walls(reader, scene);
     const check_box box = check_box_make(scene, true);

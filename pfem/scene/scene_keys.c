@@ -38,6 +38,8 @@ static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, 
                                       {"shields", BED_SHIELDS}, {0}};
 static const silt_word shear_words[] = {{"default", SHEAR_DEFAULT}, {"paper", SHEAR_PAPER}, {"gradient", SHEAR_GRADIENT},
                                         {"log-law", SHEAR_LOG_LAW}, {0}};
+static const silt_word seepage_words[] = {
+    {"none", SEEPAGE_NONE}, {"darcy", SEEPAGE_DARCY}, {"kozeny-carman", SEEPAGE_KOZENY_CARMAN}, {0}};
 static const silt_word drag_words[] = {
     {"none", DRAG_NONE},       {"stokes", DRAG_STOKES},         {"schiller-naumann", DRAG_SCHILLER_NAUMANN}, {"abraham", DRAG_ABRAHAM},
     {"di-felice", DRAG_DI_FELICE}, {"ergun", DRAG_ERGUN},       {"wen-yu", DRAG_WEN_YU},
@@ -387,6 +389,12 @@ static const silt_key bed_rows[] = {
      .doc = "the part of the bed that parcels lie on does not wear"},
     {"saturation", KEY_NUMBER, .fallback = "1", RANGE(0, 1), AT(silt_bed_def, saturation),
      .doc = "share of the pores that holds water"},
+    {"seepage", KEY_WORD, .fallback = "none", .words = seepage_words, AT(silt_bed_def, seepage),
+     .doc = "water in the bed's pores: none, by `permeability`, or by grains.diameter and the pores of each cell, d^2 n^3/(180 (1 - n)^2)"},
+    {"permeability", KEY_NUMBER, .unit = "m2", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, permeability),
+     .doc = "for seepage: darcy; the hydraulic conductivity K in m/s is this times density g/viscosity"},
+    {"fluidise", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, fluidise),
+     .doc = "seepage that outweighs the grains on the surface lifts them off"},
     {"deposition", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, deposition),
      .doc = "resting grains become bed again"},
     {"condition", KEY_WORD, .fallback = "no-slip", .words = condition_words, AT(silt_bed_def, condition),
@@ -401,6 +409,7 @@ static const silt_key grain_rows[] = {
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_grain_def, velocity), .doc = "at the start"},
     {"diameter", KEY_NUMBER, .unit = "m", POSITIVE, AT(silt_grain_def, diameter), .doc = "of this grain"},
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_grain_def, density), .doc = "of its solid"},
+    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_grain_def, fixed), .doc = "it is held where it is, at rest; others touch it"},
     {0}};
 TABLE(grain, "a grain", silt_grain_def, -1);
 
@@ -423,6 +432,7 @@ static const silt_key fill_rows[] = {
             "from below; denser packings come by letting grains settle"},
     {"seed", KEY_INTEGER, .fallback = "1", RANGE(0, INT32_MAX), AT(silt_fill_def, seed),
      .doc = "of the random places: the same places for the same seed"},
+    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_fill_def, fixed), .doc = "its grains are held where they are, at rest: a packed bed"},
     {0}};
 TABLE(fill, "a region of grains", silt_fill_def, offsetof(silt_fill_def, region.kind));
 
@@ -443,8 +453,6 @@ static const silt_key grains_rows[] = {
      .doc = "force of the water's viscous stress on the grain's volume"},
     {"rotational_drag", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, rotational_drag),
      .doc = "torque of the water on grains that spin otherwise than it does"},
-    {"fixed", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, fixed),
-     .doc = "grains that are there from the start stay where they are: a packed bed"},
     {"list", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &grain_table, MANY(silt_grains_def, n_grain, grain),
      .doc = "grains that are there from the start"},
     {"regions", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &fill_table, MANY(silt_grains_def, n_fill, fill),
