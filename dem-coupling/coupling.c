@@ -413,7 +413,7 @@ static silt_status coupling_prepare(silt_coupling *c, const silt_nodes *nodes, c
 static void coupling_load(silt_coupling *c, const silt_nodes *nodes, const silt_mesh *mesh, double dt) {
     (void)mesh; // the exchange holds on to the one of prepare
     if (c->wet)
-        silt_exchange_load(&c->exchange, nodes->v, nodes->p, dt);
+        silt_exchange_load(&c->exchange, nodes->v, nodes->p, dt, nodes->x);
     else
         c->exchange.totals = (silt_exchange_totals){0};
     for (int i = 0; i < c->n_grain; i++) {

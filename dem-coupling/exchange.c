@@ -572,15 +572,17 @@ silt_status silt_exchange_prepare(silt_exchange *e, const silt_nodes *nodes, con
     return SILT_OK;
 }
 
-void silt_exchange_load(silt_exchange *e, const double *velocity, const double *pressure, double dt) {
+void silt_exchange_load(silt_exchange *e, const double *velocity, const double *pressure, double dt, const double *middle) {
+    const int D = e->dim;
     silt_exchange_totals *t = &e->totals;
     *t = (silt_exchange_totals){0};
     if (dt != e->dt) // the water was told of another step than it took: nothing to hold on to but the new one
         exchange_update(e, velocity, pressure, dt);
     // the pressure on the grains acts where the water's does: on the mesh of the last iterate
     exchange_midpoint(e, dt);
+    for (int k = 0; k < e->n_look && middle; k++)
+        memcpy(e->middle + D * k, middle + D * e->look[k], (size_t)D * sizeof *middle);
     exchange_gather(e, velocity, pressure, e->spare);
-    const int D = e->dim;
     for (int m = 0; m < e->n_look; m++)
         for (int k = 0, i = e->look[m]; k < D; k++)
             t->water[k] += e->push[D * i + k] - e->coefficient[i] * e->spare[(D + 1) * m + k];
