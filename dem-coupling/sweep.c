@@ -4,7 +4,7 @@
 #include "parallel.h"
 #include "vector.h"
 
-static const double sweep_left = 0.05;   // what is left of the roughest fields
+static const double sweep_left = 0.02;   // what is left of the roughest fields
 static const double sweep_cap = 10.0;    // see sweep_bound
 static const double sweep_sliver = 0.02; // of a regular tetrahedron: gradients are bounded as if a cell had this share of its volume
 
