@@ -5,6 +5,7 @@
 
 static const double kernel_reach = 6.0; // kernel widths in the plane; the kernel falls off with exp(-2 r/width)
 static const double sweep_reach = 3.0;  // in space, where it falls off with exp(-(r/width)^2)
+static const double solid_bound = 0.9;  // largest solid fraction in space
 static const double flat_cell =
     0.05; // of its area: a cell flatter than this at the middle of the step counts as at its start
 
@@ -159,7 +160,7 @@ static void exchange_pack(silt_exchange *e, double dt) {
             diameter[i] = g->diameter;
             number[i] = idle ? 0.0 : g->number;
             to->pace[i] = g->held ? 0.0 : dt / g->mass;
-            to->solid[i] = idle ? 0.0 : g->solid;
+            to->solid[i] = idle ? 0.0 : g->immersed;
             for (int k = 0; k < D; k++) {
                 to->v[k][i] = g->v[k];
                 to->start[k][i] = g->v[k] + (g->held ? 0.0 : dt * e->gravity[k] + to->pace[i] * g->contact[k]);
@@ -506,6 +507,35 @@ static void exchange_look(silt_exchange *e) {
     }
 }
 
+// solid fraction
+static void exchange_solid(silt_exchange *e) {
+    const silt_mesh *mesh = e->mesh;
+    memset(e->solid, 0, (size_t)e->n_node * sizeof *e->solid);
+    for (int p = 0; p < e->n_wet; p++) {
+        const silt_exchange_grain *g = &e->grain[e->wet[p]];
+        for (int a = 0; a <= e->dim; a++)
+            e->solid[mesh->cell[g->cell][a]] += g->weight[a] * g->immersed;
+    }
+    silt_kernel_smooth(&e->kernel, e->solid);
+}
+
+// Where there is more solid than room for it, in drops of spray that are smaller than a grain, the grains are but half in the water:
+// more than this share turned the water's pressure round, and shot the drop away. @return whether any is
+static bool exchange_bound(silt_exchange *e) {
+    bool any = false;
+    for (int p = 0; p < e->n_wet; p++) {
+        silt_exchange_grain *g = &e->grain[e->wet[p]];
+        double solid = 0.0;
+        for (int a = 0; a <= e->dim; a++)
+            solid += g->weight[a] * e->solid[e->mesh->cell[g->cell][a]];
+        if (solid <= solid_bound)
+            continue;
+        g->immersed *= solid_bound / solid;
+        any = true;
+    }
+    return any;
+}
+
 // true when mesh and grains stand where they stood at the last place
 bool silt_exchange_stands(const silt_exchange *e, const silt_nodes *nodes, const silt_mesh *mesh) {
     return e->placed && e->mesh == mesh && e->revision == mesh->revision && e->n_node == mesh->n_node &&
@@ -533,14 +563,11 @@ silt_status silt_exchange_place(silt_exchange *e, const silt_nodes *nodes, const
     SILT_RESERVE(e->read, e->node_capacity[4], READ_FIELDS(D) * (e->n_look + 1));
     SILT_RESERVE(e->give, e->node_capacity[5], GIVE_FIELDS * (e->n_look + 1));
 
-    // solid fraction
-    memset(e->solid, 0, (size_t)n * sizeof *e->solid);
-    for (int p = 0; p < e->n_wet; p++) {
-        const silt_exchange_grain *g = &e->grain[e->wet[p]];
-        for (int a = 0; a <= D; a++)
-            e->solid[mesh->cell[g->cell][a]] += g->weight[a] * g->solid;
-    }
-    silt_kernel_smooth(&e->kernel, e->solid);
+    for (int p = 0; p < e->n_wet; p++)
+        e->grain[e->wet[p]].immersed = e->grain[e->wet[p]].solid;
+    exchange_solid(e);
+    if (D == 3 && exchange_bound(e))
+        exchange_solid(e);
     e->drag = (silt_drag){.solid = e->solid,
                           .coefficient = e->coefficient,
                           .push = e->push,

@@ -28,6 +28,7 @@ typedef struct silt_exchange_grain {
     bool held;         // stays as fast as it is, whatever acts on it
     int cell;          // of the water's mesh, -1: not in the water
     double weight[4];  // barycentric, in that cell
+    double immersed;   // m3, result of place: what of its solid displaces water; less in a drop that is smaller than the grain
     // results of load
     double water[3];    // m/s, the water's velocity at the grain
     double effective;   // kg/(s m), beta_eff
