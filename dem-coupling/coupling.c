@@ -134,11 +134,8 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     c->exchange.density = scene->fluid.density;
     c->exchange.viscosity = scene->fluid.viscosity;
     c->exchange.refresh = true;
-    c->exchange.force.def = (silt_force_def){.added_mass = grains->added_mass,
-                                             .theta = scene->fluid.theta,
-                                             .viscous = grains->viscous_force,
-                                             .lift = grains->lift == LIFT_SAFFMAN,
-                                             .spin = grains->rotational_drag};
+    c->exchange.force.def = (silt_force_def){grains->added_mass, scene->fluid.theta, grains->viscous_force,
+                                             grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     memcpy(c->exchange.gravity, scene->gravity, sizeof c->exchange.gravity);
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
@@ -428,7 +425,7 @@ static silt_status coupling_prepare(silt_coupling *c, const silt_nodes *nodes, c
 static void coupling_load(silt_coupling *c, const silt_nodes *nodes, const silt_mesh *mesh, double dt) {
     (void)mesh; // the exchange holds on to the one of prepare
     if (c->wet)
-        silt_exchange_load(&c->exchange, nodes->v, nodes->p, dt);
+        silt_exchange_load(&c->exchange, nodes->v, nodes->p, dt, nodes->x);
     else
         c->exchange.totals = (silt_exchange_totals){0};
     for (int i = 0; i < c->n_grain; i++) {
