@@ -93,7 +93,7 @@ struct silt_coupling {
     silt_dem_sphere *add; // owned
     double elapsed;       // s, of the running substeps
     double contact[3];    // N/m, of contacts on all grains, of the last substeps
-    double left_mass;
+    double left_mass, left_rest; // and what rounding left out of it (silt_sum)
     int64_t left_count;
     silt_error refused; // why a release cannot be; returned by the next start
 };

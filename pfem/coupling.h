@@ -41,7 +41,7 @@ typedef struct silt_coupling_type {
     silt_status (*prepare)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, double dt,
                            const silt_drag **drag, silt_error *err);
     /** After the water's step, before nodes move: forces on grains from the accepted pressure and the velocity that the drag
-     * was solved with (nodes->v must be the fluid's w, that positions move with; their sum is then what the water felt),
+     * was solved with (nodes->v must be the fluid's w, and nodes->x its midpoint mesh; their sum is then what the water felt),
      * forces on bodies: force and torque in bodies()->body[] were set by the run. */
     void (*load)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, double dt);
 

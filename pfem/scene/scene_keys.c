@@ -38,6 +38,7 @@ static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, 
                                       {"shields", BED_SHIELDS}, {0}};
 static const silt_word shear_words[] = {{"default", SHEAR_DEFAULT}, {"paper", SHEAR_PAPER}, {"gradient", SHEAR_GRADIENT},
                                         {"log-law", SHEAR_LOG_LAW}, {0}};
+static const silt_word deposit_words[] = {{"grow", 0}, {"densify", 1}, {0}};
 static const silt_word seepage_words[] = {
     {"none", SEEPAGE_NONE}, {"darcy", SEEPAGE_DARCY}, {"kozeny-carman", SEEPAGE_KOZENY_CARMAN}, {0}};
 static const silt_word drag_words[] = {
@@ -397,6 +398,11 @@ static const silt_key bed_rows[] = {
      .doc = "seepage that outweighs the grains on the surface lifts them off"},
     {"deposition", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, deposition),
      .doc = "resting grains become bed again"},
+    {"deposit", KEY_WORD, .fallback = "grow", .words = deposit_words, AT(silt_bed_def, densify),
+     .doc = "resting grains become new cells of the bed, or first fill cells that are looser than porosity"},
+    {"deposit_work", KEY_NUMBER, .unit = "J/m3", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, deposit_work),
+     .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION) | ONLY(BED_POWER),
+     .doc = "`work` of what was deposited; 0: the same"},
     {"condition", KEY_WORD, .fallback = "no-slip", .words = condition_words, AT(silt_bed_def, condition),
      .doc = "of the water on the bed"},
     {"regions", KEY_LIST, .sub = &region_table, MANY(silt_bed_def, n_region, region),
@@ -440,6 +446,11 @@ static const silt_key grains_rows[] = {
     {"drag", KEY_WORD, .fallback = "di-felice", .words = drag_words, AT(silt_grains_def, drag), .doc = "drag law"},
     {"parcel", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, parcel),
      .doc = "diameter of the elements that released bed becomes; needed with a bed"},
+    {"per_patch", KEY_INTEGER, .fallback = "0", RANGE(0, 64), AT(silt_grains_def, per_patch),
+     .doc = "how many parcels a patch of the bed becomes; 0: as many of the diameter parcel as make its mass"},
+    {"sieve", KEY_TABLE, .flags = KEY_OPTIONAL, AT(silt_grains_def, sieve),
+     .doc = "CSV file beside the scene: diameter in m, share of the mass that passes (from 0 to 1), columns diameter, passing; the diameters "
+            "of the parcels, drawn by fluid.seed and node"},
     {"diameter", KEY_NUMBER, .unit = "m", .fallback = "=grains.parcel", NOT_NEGATIVE, AT(silt_grains_def, diameter),
      .doc = "of the grains that a parcel stands for, for the drag"},
     {"width", KEY_NUMBER, .unit = "m", .fallback = "0", .flags = KEY_PLANE, NOT_NEGATIVE, AT(silt_grains_def, width),
@@ -515,7 +526,7 @@ static const silt_key gauge_rows[] = {
     {"velocity_at", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_VELOCITY, AT(silt_gauge_def, from),
      .doc = "velocity there, columns NAME_x, NAME_y, NAME_z"},
     {"discharge", KEY_SEGMENT, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_DISCHARGE,
-     AT(silt_gauge_def, from), .doc = "flow through the segment from its left to its right, m2/s"},
+     AT(silt_gauge_def, from), .doc = "flow through the segment from its left to its right, with seepage also that through the bed, m2/s"},
     {"bed_level_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_BED_LEVEL,
      AT(silt_gauge_def, from), .doc = "height of the bed at this x (3-D: [x, y])"},
     {"scour_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_SCOUR,
