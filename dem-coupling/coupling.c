@@ -134,11 +134,8 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     c->exchange.density = scene->fluid.density;
     c->exchange.viscosity = scene->fluid.viscosity;
     c->exchange.refresh = true;
-    c->exchange.force.def = (silt_force_def){.added_mass = grains->added_mass,
-                                             .theta = scene->fluid.theta,
-                                             .viscous = grains->viscous_force,
-                                             .lift = grains->lift == LIFT_SAFFMAN,
-                                             .spin = grains->rotational_drag};
+    c->exchange.force.def = (silt_force_def){grains->added_mass, scene->fluid.theta, grains->viscous_force,
+                                             grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     memcpy(c->exchange.gravity, scene->gravity, sizeof c->exchange.gravity);
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
@@ -312,27 +309,35 @@ static double coupling_wall_distance(const silt_walls *walls, int i, const doubl
     return hypot(d[0] - t * e[0], d[1] - t * e[1]);
 }
 
+static double coupling_apart(const silt_coupling *c, const double *x, const double *y) {
+    const double flat = hypot(x[0] - y[0], x[1] - y[1]);
+    return c->dim == 3 ? hypot(flat, x[2] - y[2]) : flat;
+}
+
 // free distance from a point to grains and bodies
-static double coupling_gap(const void *context, const double x[2]) {
+static double coupling_gap(const void *context, const double *x) {
     const silt_coupling *c = context;
     double gap = HUGE_VAL;
     for (int i = 0; i < c->n_grain; i++)
         if (!c->grain[i].gone)
-            gap = silt_min(gap, hypot(x[0] - c->grain[i].x[0], x[1] - c->grain[i].x[1]) - c->grain[i].radius);
+            gap = silt_min(gap, coupling_apart(c, x, c->grain[i].x) - c->grain[i].radius);
     for (int i = 0; i < c->bodies->count; i++)
         gap = silt_min(gap, coupling_body_distance(c, i, x, gap));
     return gap;
 }
 
-static bool coupling_room(const silt_coupling *c, const double x[2], double radius) {
+static bool coupling_room(const silt_coupling *c, const double *x, double radius) {
     double need = (1.0 - room_overlap) * radius;
     if (coupling_gap(c, x) < need)
         return false;
     for (int i = 0; i < c->frozen.count; i++) {
         const silt_frozen_sphere *s = &c->frozen.sphere[i];
-        if (hypot(x[0] - s->x[0], x[1] - s->x[1]) - s->radius < need)
+        if (coupling_apart(c, x, s->x) - s->radius < need)
             return false;
     }
+    int element;
+    if (c->dim == 3)
+        return c->walls->count == 0 || silt_walls_distance(c->walls, x, &element) >= need;
     for (int i = 0; i < c->walls->count; i++)
         if (coupling_wall_distance(c->walls, i, x) < need)
             return false;
@@ -420,7 +425,7 @@ static silt_status coupling_prepare(silt_coupling *c, const silt_nodes *nodes, c
 static void coupling_load(silt_coupling *c, const silt_nodes *nodes, const silt_mesh *mesh, double dt) {
     (void)mesh; // the exchange holds on to the one of prepare
     if (c->wet)
-        silt_exchange_load(&c->exchange, nodes->v, nodes->p, dt);
+        silt_exchange_load(&c->exchange, nodes->v, nodes->p, dt, nodes->x);
     else
         c->exchange.totals = (silt_exchange_totals){0};
     for (int i = 0; i < c->n_grain; i++) {
@@ -471,7 +476,7 @@ static void coupling_add(silt_coupling *c) {
                 continue;
             double density = c->scene->bed.on ? c->scene->bed.density : 1000.0;
             c->add[n++] = (silt_dem_sphere){
-                .id = f->id, .kind = DEM_FROZEN, .x = {f->x[0], f->x[1]}, .radius = f->radius, .density = density};
+                .id = f->id, .kind = DEM_FROZEN, .x = {f->x[0], f->x[1], f->x[2]}, .radius = f->radius, .density = density};
             f->sent = true;
         }
     }
@@ -501,6 +506,7 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
             c->force[3 * k + d] = g->force[d] * c->width * silt_coupling_burden(c, g);
     }
     silt_coupling_twist(c);
+    silt_coupling_shift(c);
     for (int i = 0; i < c->bodies->count; i++)
         for (int k = 0; k < 3; k++) {
             c->body_force[3 * i + k] = c->bodies->body[i].force[k] * c->width;
@@ -713,7 +719,8 @@ static void coupling_close(silt_coupling **coupling) {
     void *owned[] = {w->contact, w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
                      c->body,     c->body_force, c->body_torque, c->force, c->add,    c->torque,
-                     c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate};
+                     c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate,
+                     c->eddy,     c->shift,      c->walk};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);
@@ -777,6 +784,7 @@ const silt_coupling_type silt_coupling_dem = {
     .bodies = coupling_bodies,
     .prepare = coupling_prepare,
     .load = coupling_load,
+    .walk = silt_coupling_walk,
     .exchanged = coupling_exchanged,
     .outline = coupling_outline,
     .room = coupling_room,

@@ -95,6 +95,8 @@ void silt_dem_twist(silt_dem *dem, const double *torque);
  * plane from x to y, in space from x to z; and where they stand at the end of the next run, the numbers of the definition's walls or
  * triangles. */
 void silt_dem_move_walls(silt_dem *dem, const double (*rate)[4], const double *wall);
+/** Steps aside before the next run, 3 per grain in the order of the last state, m; borrowed until then */
+void silt_dem_shift(silt_dem *dem, const double *shift);
 /** The next run may go on from where the last one ended, with its neighbour lists and without a set-up. A run is set up all the
  * same when there are edits or free bodies, and after a save or load. How the lists came about decides the order of sums: the
  * same bits come again only when set-ups come at the same steps again. */

@@ -395,8 +395,8 @@ typedef struct silt_body_state {
 
 /** a parcel that leaves the bed */
 typedef struct silt_release {
-    double x[2];      // centre
-    double v[2];
+    double x[3];      // centre; in 2-D z = 0
+    double v[3];
     double radius;    // m
     double mass;      // kg per m of width; solid volume is mass / bed.density
 } silt_release;

@@ -10,6 +10,7 @@
 #define DEPOSIT_PORES 0.5   // of the bed's porosity: what pores are filled to at most
 #define DEPOSIT_SHIELDS 0.8 // of the stress that moves grains
 #define RELEASE_MOST 64     // patches in one step
+#define ROOM_SIDES 19       // places beside each on the way out
 #define RELEASE_LONG 4      // radii: a parcel that had to look farther goes up through the heap on it
 #define RELEASE_FAR 12      // radii, the farthest that it looks
 #define RELEASE_LIFTS 0.5   // upward part of the normal above which seepage can lift grains off
@@ -168,28 +169,69 @@ void silt_run_release(silt_run *run) {
     }
 }
 
+// true when a parcel fits there
+static bool room_at(const silt_run *run, const double *x, double radius, int n_placed, const silt_release *placed) {
+    int element;
+    if (run->walls.count && silt_walls_distance(&run->walls, x, &element) < radius)
+        return false;
+    if (run->bed.dim == 3 && silt_bed_contains(&run->bed, x))
+        return false;
+    for (int k = 0; k < n_placed; k++) {
+        const double flat = hypot(x[0] - placed[k].x[0], x[1] - placed[k].x[1]), up = x[2] - placed[k].x[2];
+        if (hypot(flat, up) <= radius + placed[k].radius)
+            return false;
+    }
+    return silt_coupling_dem.room(run->coupling, x, radius);
+}
+
+// steps to the side, the first is none: along the surface in the plane, in rings in space. @return how many
+static int room_sides(int dim, const double *n, double radius, double side[ROOM_SIDES][3]) {
+    int count = 0;
+    memset(side, 0, ROOM_SIDES * sizeof *side);
+    if (dim == 2) {
+        for (; count < 5; count++) {
+            const double along = (count + 1) / 2 * (count % 2 ? 1 : -1) * 0.5 * radius;
+            side[count][0] = -along * n[1];
+            side[count][1] = along * n[0];
+        }
+        return count;
+    }
+    double u[3], v[3], least[3] = {0};
+    least[fabs(n[0]) < 0.6 ? 0 : 1] = 1;
+    for (int pass = 0; pass < 2; pass++) {
+        const double *from = pass ? u : least;
+        double *to = pass ? v : u;
+        for (int d = 0; d < 3; d++)
+            to[d] = n[(d + 1) % 3] * from[(d + 2) % 3] - n[(d + 2) % 3] * from[(d + 1) % 3];
+        const double length = silt_length(3, to);
+        for (int d = 0; d < 3; d++)
+            to[d] /= length;
+    }
+    count = 1;
+    for (int ring = 1; ring <= 2; ring++)
+        for (int k = 0; k < 6 * ring; k++, count++)
+            for (int d = 0; d < 3; d++)
+                side[count][d] = ring * radius * (cos(M_PI / 3 * k / ring) * u[d] + sin(M_PI / 3 * k / ring) * v[d]);
+    return count;
+}
+
 // a place for the parcel: out along the normal and to the sides; one that has waited long also straight up
 static bool find_room(const silt_run *run, const silt_waiting *waiting, double radius, int n_placed,
-                      const silt_release *placed, double out[2]) {
+                      const silt_release *placed, double out[3]) {
     const double *g = run->scene->gravity, size = gravity_of(run->scene);
-    const double up[2] = {size > 0 ? -g[0] / size : 0, size > 0 ? -g[1] / size : 0};
-    const int steps = (int)silt_max(12, ceil(3 * (waiting->reach + radius) / radius));
+    const double up[3] = {size > 0 ? -g[0] / size : 0, size > 0 ? -g[1] / size : 0, size > 0 ? -g[2] / size : 0};
+    const int steps = (int)silt_max(12, ceil(3 * (waiting->reach + radius) / radius)), dim = run->bed.dim == 3 ? 3 : 2;
     const bool long_since = waiting->reach > RELEASE_LONG * radius && size > 0;
+    double side[ROOM_SIDES][3];
     for (int way = 0; way <= steps * (1 + long_since); way++) {
         const int out_step = way <= steps ? way : way - steps;
-        const double *n = way <= steps ? waiting->normal : up, tangent[2] = {-n[1], n[0]};
-        for (int side = 0; side < 5; side++) {
-            const double along = (side + 1) / 2 * (side % 2 ? 1 : -1) * 0.5 * radius;
+        const double *n = way <= steps ? waiting->normal : up;
+        const int n_side = room_sides(dim, n, radius, side);
+        for (int k = 0; k < n_side; k++) {
             const double outward = out_step * (waiting->reach + radius) / steps;
-            for (int d = 0; d < 2; d++)
-                out[d] = waiting->x[d] + outward * n[d] + along * tangent[d];
-            int segment;
-            if (run->walls.count && silt_walls_distance(&run->walls, out, &segment) < radius)
-                continue;
-            bool free = silt_coupling_dem.room(run->coupling, out, radius);
-            for (int k = 0; k < n_placed && free; k++)
-                free = hypot(out[0] - placed[k].x[0], out[1] - placed[k].x[1]) > radius + placed[k].radius;
-            if (free)
+            for (int d = 0; d < 3; d++)
+                out[d] = waiting->x[d] + outward * n[d] + side[k][d];
+            if (room_at(run, out, radius, n_placed, placed))
                 return true;
         }
     }

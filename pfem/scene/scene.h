@@ -254,6 +254,8 @@ typedef struct silt_grains_def {
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false
     bool rotational_drag; // torque on the spin, default false
+    bool random_walk;     // of suspended grains in the eddies, default false
+    double schmidt;       // 1, eddy viscosity over the grains' diffusivity
     int n_grain;
     silt_grain_def *grain; // owned; key `list`
     int n_fill;
@@ -312,11 +314,11 @@ typedef enum {
     GAUGE_GRAIN_FRONT,  // grains_front: x | -x: the foremost x of the grains that hang together
     GAUGE_GRAIN_HEIGHT, // grains_height_at: X (3-D: [x, y]): their top above that place
     GAUGE_GRAIN_SLOPE,  // grains_slope: [x0, x1]: degrees by which it falls to the right, from x0 = from[0] to x1 = from[1]
-    GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
     GAUGE_GRAIN_PLACE,    // grain_place: K: of grain K (silt_gauge_def.index): columns NAME_x, NAME_y, NAME_z
     GAUGE_GRAIN_VELOCITY, // grain_velocity: K
     GAUGE_GRAIN_SPIN,     // grain_spin: K
     GAUGE_GRAIN_FORCE,    // grain_force: K: of its contacts
+    GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
 } silt_gauge_kind;
 typedef struct silt_gauge_def {
