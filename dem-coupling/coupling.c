@@ -732,17 +732,11 @@ static void coupling_close(silt_coupling **coupling) {
 
 // ---------------------------------------------------------------- small answers
 
-static double coupling_step(const silt_coupling *c) {
-    return c->step;
-}
+static double coupling_step(const silt_coupling *c) { return c->step; }
 
-static silt_body_state *coupling_bodies(const silt_coupling *c) {
-    return c->bodies;
-}
+static silt_body_state *coupling_bodies(const silt_coupling *c) { return c->bodies; }
 
-static int coupling_process(const silt_coupling *c) {
-    return silt_dem_process(c->dem);
-}
+static int coupling_process(const silt_coupling *c) { return silt_dem_process(c->dem); }
 
 static int coupling_outline(const silt_coupling *c, int body, double h, double *point, int capacity) {
     return silt_outline_nodes(&c->body[body].shape, h, point, capacity);
