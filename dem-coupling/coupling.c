@@ -512,6 +512,9 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
 
 static void coupling_leave(silt_coupling *c, coupling_grain *g) {
     c->left_mass += g->mass;
+    const int i = (int)(g - c->grain);
+    if (i < c->n_loaded && c->exchange.grain[i].cell >= 0)
+        c->left_solid += c->exchange.grain[i].immersed;
     c->left_count++;
     coupling_take(c, g);
 }
@@ -734,8 +737,9 @@ static int coupling_outline(const silt_coupling *c, int body, double h, double *
     return silt_outline_nodes(&c->body[body].shape, h, point, capacity);
 }
 
-static void coupling_left(const silt_coupling *c, double *mass, int64_t *count) {
+static void coupling_left(const silt_coupling *c, double *mass, double *solid, int64_t *count) {
     *mass = c->left_mass;
+    *solid = c->left_solid;
     *count = c->left_count;
 }
 

@@ -89,7 +89,7 @@ struct silt_coupling {
     silt_dem_sphere *add; // owned
     double elapsed;       // s, of the running substeps
     double contact[3];    // N/m, of contacts on all grains, of the last substeps
-    double left_mass;
+    double left_mass, left_solid; // kg/m of grains that crossed an outlet, m3/m of water that they displaced there
     int64_t left_count;
     silt_error refused; // why a release cannot be; returned by the next start
 };
