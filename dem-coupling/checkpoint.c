@@ -1,7 +1,7 @@
 // checkpoint.c: what the coupling knows, as named arrays in the store
 #include "state.h"
 
-enum { GRAIN_DOUBLES = 23, FROZEN_DOUBLES = 7, BODY_DOUBLES = 22 };
+enum { GRAIN_DOUBLES = 23, FROZEN_DOUBLES = 13, BODY_DOUBLES = 22 };
 
 // one row of numbers per grain, sphere or body, filled or read in one place
 static void checkpoint_copy(bool out, double **row, double *value, int n) {
@@ -25,10 +25,9 @@ static void checkpoint_grain_row(bool out, double *row, coupling_grain *g) {
 }
 
 static void checkpoint_frozen_row(bool out, double *row, silt_frozen_sphere *s) {
-    checkpoint_copy(out, &row, s->x, 2);
+    checkpoint_copy(out, &row, s->x, 3);
     checkpoint_copy(out, &row, &s->radius, 1);
-    checkpoint_copy(out, &row, s->end[0], 2);
-    checkpoint_copy(out, &row, s->end[1], 2);
+    checkpoint_copy(out, &row, s->end[0], 9);
 }
 
 static void checkpoint_body_row(bool out, double *row, struct silt_body *b) {
@@ -44,7 +43,7 @@ static void checkpoint_body_row(bool out, double *row, struct silt_body *b) {
 /** the arrays of a checkpoint; owned */
 typedef struct checkpoint_rows {
     int64_t number[5]; // grains, frozen spheres, bodies, next id, grains that left
-    double left[2];
+    double left[3];
     int64_t *grain_id, *frozen_id;
     int *frozen_node;
     double *grain, *frozen, *body;
@@ -54,7 +53,7 @@ static void checkpoint_rows_create(checkpoint_rows *r) {
     r->grain_id = silt_alloc((size_t)r->number[0], sizeof(int64_t));
     r->grain = silt_alloc((size_t)r->number[0] * GRAIN_DOUBLES, sizeof(double));
     r->frozen_id = silt_alloc((size_t)r->number[1], sizeof(int64_t));
-    r->frozen_node = silt_alloc((size_t)r->number[1] * 2, sizeof(int));
+    r->frozen_node = silt_alloc((size_t)r->number[1] * 3, sizeof(int));
     r->frozen = silt_alloc((size_t)r->number[1] * FROZEN_DOUBLES, sizeof(double));
     r->body = silt_alloc((size_t)r->number[2] * BODY_DOUBLES, sizeof(double));
 }
@@ -77,11 +76,11 @@ static silt_status checkpoint_rows_store(checkpoint_rows *r, bool out, silt_stor
         size_t n;
         void *data;
     } array[] = {
-        {"coupling/left", STORE_DOUBLE, 2, r->left},
+        {"coupling/left", STORE_DOUBLE, 3, r->left},
         {"coupling/grain_id", STORE_LONG, grains, r->grain_id},
         {"coupling/grain", STORE_DOUBLE, grains * GRAIN_DOUBLES, r->grain},
         {"coupling/frozen_id", STORE_LONG, frozen, r->frozen_id},
-        {"coupling/frozen_node", STORE_INT, frozen * 2, r->frozen_node},
+        {"coupling/frozen_node", STORE_INT, frozen * 3, r->frozen_node},
         {"coupling/frozen", STORE_DOUBLE, frozen * FROZEN_DOUBLES, r->frozen},
         {"coupling/body", STORE_DOUBLE, bodies * BODY_DOUBLES, r->body},
     };
@@ -104,7 +103,7 @@ static void checkpoint_rows_fill(checkpoint_rows *r, bool out, silt_coupling *c)
         silt_frozen_sphere *s = &c->frozen.sphere[i];
         checkpoint_frozen_row(out, r->frozen + (size_t)i * FROZEN_DOUBLES, s);
         *(out ? &r->frozen_id[i] : &s->id) = out ? s->id : r->frozen_id[i];
-        memcpy(out ? r->frozen_node + 2 * i : s->node, out ? s->node : r->frozen_node + 2 * i, sizeof s->node);
+        memcpy(out ? r->frozen_node + 3 * i : s->node, out ? s->node : r->frozen_node + 3 * i, sizeof s->node);
     }
     for (int i = 0; i < c->bodies->count; i++)
         checkpoint_body_row(out, r->body + (size_t)i * BODY_DOUBLES, &c->bodies->body[i]);
@@ -112,7 +111,7 @@ static void checkpoint_rows_fill(checkpoint_rows *r, bool out, silt_coupling *c)
 
 silt_status silt_checkpoint_save(silt_coupling *c, silt_store *store, silt_error *err) {
     checkpoint_rows r = {.number = {c->n_grain, c->frozen.count, c->bodies->count, c->next_id, c->left_count},
-                         .left = {c->left_mass, c->left_solid}};
+                         .left = {c->left_mass, c->left_rest, c->left_solid}};
     checkpoint_rows_create(&r);
     checkpoint_rows_fill(&r, true, c);
     silt_status status = silt_store_put(store, "coupling/number", STORE_LONG, 5, r.number, err);
@@ -141,7 +140,8 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     c->next_id = r.number[3];
     c->left_count = r.number[4];
     c->left_mass = r.left[0];
-    c->left_solid = r.left[1];
+    c->left_rest = r.left[1];
+    c->left_solid = r.left[2];
     c->n_grain = (int)r.number[0];
     c->n_last = 0;
     c->sent_id = r.number[3];

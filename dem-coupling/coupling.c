@@ -151,6 +151,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .period = period_share * 2.0 * largest,
         .gravity = {scene->gravity[0], scene->gravity[1], scene->gravity[2]},
         .youngs_modulus = contact->youngs_modulus,
+        .wall_modulus = contact->wall_modulus,
         .poissons_ratio = contact->poissons_ratio,
         .restitution = contact->restitution,
         .friction = contact->friction,
@@ -228,6 +229,7 @@ static const silt_grain_state *coupling_grains(const silt_coupling *c) {
     SILT_RESERVE(w->net, w->capacity[6], n);
     SILT_RESERVE(w->contacts, w->capacity[7], n);
     SILT_RESERVE(w->on_bed, w->capacity[8], n);
+    SILT_RESERVE(w->contact, w->capacity[9], 3 * n);
     SILT_RESERVE(w->map, w->map_capacity, n);
     for (int i = 0; i < n; i++) {
         const coupling_grain *g = &c->grain[i];
@@ -240,6 +242,7 @@ static const silt_grain_state *coupling_grains(const silt_coupling *c) {
         w->radius[count] = g->radius;
         w->mass[count] = g->mass;
         w->net[count] = g->net;
+        memcpy(w->contact + 3 * count, g->contact, sizeof g->contact);
         w->contacts[count] = g->contacts;
         w->on_bed[count] = g->on_bed;
         w->map[count++] = i;
@@ -253,6 +256,7 @@ static const silt_grain_state *coupling_grains(const silt_coupling *c) {
                                   .mass = w->mass,
                                   .contacts = w->contacts,
                                   .on_bed = w->on_bed,
+                                  .contact = w->contact,
                                   .net_force = w->net};
     w->fresh = true;
     return &w->state;
@@ -305,27 +309,35 @@ static double coupling_wall_distance(const silt_walls *walls, int i, const doubl
     return hypot(d[0] - t * e[0], d[1] - t * e[1]);
 }
 
+static double coupling_apart(const silt_coupling *c, const double *x, const double *y) {
+    const double flat = hypot(x[0] - y[0], x[1] - y[1]);
+    return c->dim == 3 ? hypot(flat, x[2] - y[2]) : flat;
+}
+
 // free distance from a point to grains and bodies
-static double coupling_gap(const void *context, const double x[2]) {
+static double coupling_gap(const void *context, const double *x) {
     const silt_coupling *c = context;
     double gap = HUGE_VAL;
     for (int i = 0; i < c->n_grain; i++)
         if (!c->grain[i].gone)
-            gap = silt_min(gap, hypot(x[0] - c->grain[i].x[0], x[1] - c->grain[i].x[1]) - c->grain[i].radius);
+            gap = silt_min(gap, coupling_apart(c, x, c->grain[i].x) - c->grain[i].radius);
     for (int i = 0; i < c->bodies->count; i++)
         gap = silt_min(gap, coupling_body_distance(c, i, x, gap));
     return gap;
 }
 
-static bool coupling_room(const silt_coupling *c, const double x[2], double radius) {
+static bool coupling_room(const silt_coupling *c, const double *x, double radius) {
     double need = (1.0 - room_overlap) * radius;
     if (coupling_gap(c, x) < need)
         return false;
     for (int i = 0; i < c->frozen.count; i++) {
         const silt_frozen_sphere *s = &c->frozen.sphere[i];
-        if (hypot(x[0] - s->x[0], x[1] - s->x[1]) - s->radius < need)
+        if (coupling_apart(c, x, s->x) - s->radius < need)
             return false;
     }
+    int element;
+    if (c->dim == 3)
+        return c->walls->count == 0 || silt_walls_distance(c->walls, x, &element) >= need;
     for (int i = 0; i < c->walls->count; i++)
         if (coupling_wall_distance(c->walls, i, x) < need)
             return false;
@@ -464,7 +476,7 @@ static void coupling_add(silt_coupling *c) {
                 continue;
             double density = c->scene->bed.on ? c->scene->bed.density : 1000.0;
             c->add[n++] = (silt_dem_sphere){
-                .id = f->id, .kind = DEM_FROZEN, .x = {f->x[0], f->x[1]}, .radius = f->radius, .density = density};
+                .id = f->id, .kind = DEM_FROZEN, .x = {f->x[0], f->x[1], f->x[2]}, .radius = f->radius, .density = density};
             f->sent = true;
         }
     }
@@ -494,6 +506,7 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
             c->force[3 * k + d] = g->force[d] * c->width * silt_coupling_burden(c, g);
     }
     silt_coupling_twist(c);
+    silt_coupling_shift(c);
     for (int i = 0; i < c->bodies->count; i++)
         for (int k = 0; k < 3; k++) {
             c->body_force[3 * i + k] = c->bodies->body[i].force[k] * c->width;
@@ -511,7 +524,7 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
 }
 
 static void coupling_leave(silt_coupling *c, coupling_grain *g) {
-    c->left_mass += g->mass;
+    silt_sum(&c->left_mass, &c->left_rest, g->mass);
     const int i = (int)(g - c->grain);
     if (i < c->n_loaded && c->exchange.grain[i].cell >= 0)
         c->left_solid += c->exchange.grain[i].immersed;
@@ -537,21 +550,13 @@ static void coupling_receive(silt_coupling *c, coupling_grain *g, const silt_dem
     g->net = silt_length(c->dim, net);
 }
 
-// a grain that LIGGGHTS no longer has: over an outlet, or lost
-static bool coupling_left_domain(const silt_coupling *c, const coupling_grain *g) {
-    double ahead[3];
-    for (int d = 0; d < 3; d++)
-        ahead[d] = g->old_x[d] + 2.0 * c->elapsed * g->v[d];
-    return silt_coupling_leaves(c, g->old_x, ahead, 4.0 * g->radius);
-}
-
 // nothing is changed before it is sure that no grain is lost
 static silt_status coupling_complete(const silt_coupling *c, const silt_dem_state *state, silt_error *err) {
     for (int i = 0, k = 0; i < c->n_grain && state->n_grain != c->n_grain; i++) {
         const coupling_grain *g = &c->grain[i];
         while (k < state->n_grain && state->id[k] < g->id)
             k++;
-        if (!g->fixed && (k == state->n_grain || state->id[k] != g->id) && !coupling_left_domain(c, g))
+        if (!g->fixed && (k == state->n_grain || state->id[k] != g->id) && !silt_coupling_left_domain(c, g))
             return silt_fail(
                 err, SILT_FAILED,
                 "grain %lld vanished: last seen at (%g, %g) with the velocity (%g, %g) m/s and the radius %g m; it "
@@ -706,10 +711,11 @@ static void coupling_close(silt_coupling **coupling) {
     free(c->bodies->body);
     free(c->bodies);
     coupling_view *w = c->view;
-    void *owned[] = {w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
+    void *owned[] = {w->contact, w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
                      c->body,     c->body_force, c->body_torque, c->force, c->add,    c->torque,
-                     c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate};
+                     c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate,
+                     c->eddy,     c->shift,      c->walk};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);
@@ -774,6 +780,7 @@ const silt_coupling_type silt_coupling_dem = {
     .bodies = coupling_bodies,
     .prepare = coupling_prepare,
     .load = coupling_load,
+    .walk = silt_coupling_walk,
     .exchanged = coupling_exchanged,
     .outline = coupling_outline,
     .room = coupling_room,

@@ -1,5 +1,5 @@
 /** @file frozen.h
- * Spheres that never move: the crust along the exposed edges of the bed, and grains that were deposited. Here they are
+ * Spheres that never move: the crust along the exposed edges of the bed, in space under its faces, and grains that were deposited. Here they are
  * kept as a list; which of them the discrete elements have been told of stands in `sent`.
  */
 #ifndef SILT_FROZEN_H
@@ -9,9 +9,9 @@
 
 typedef struct silt_frozen_sphere {
     int64_t id;
-    double x[2], radius;
-    int node[2];      // bed nodes of the edge that it lies along, -1: a deposited grain
-    double end[2][2]; // where these nodes were: an edge that is the same keeps its spheres
+    double x[3], radius;
+    int node[3];      // bed nodes of the edge (the third is -1) or face that it lies along, -1: a deposited grain
+    double end[3][3]; // where these nodes were: an edge that is the same keeps its spheres
     bool sent;
 } silt_frozen_sphere;
 
@@ -23,7 +23,7 @@ typedef struct silt_frozen {
 } silt_frozen;
 
 /** free distance in m from x to whatever moves: a new frozen sphere is made smaller rather than pushed into it */
-typedef double (*silt_frozen_gap)(const void *context, const double x[2]);
+typedef double (*silt_frozen_gap)(const void *context, const double *x);
 /** told of a sphere that goes and that the discrete elements know */
 typedef void (*silt_frozen_drop)(void *context, int64_t id);
 
@@ -33,7 +33,7 @@ typedef void (*silt_frozen_drop)(void *context, int64_t id);
 void silt_frozen_update(silt_frozen *frozen, const silt_bed *bed, double radius, int64_t *next_id, silt_frozen_gap gap,
                         silt_frozen_drop drop, void *context);
 /** a deposited grain */
-void silt_frozen_add(silt_frozen *frozen, const double x[2], double radius, int64_t *next_id);
+void silt_frozen_add(silt_frozen *frozen, const double x[3], double radius, int64_t *next_id);
 void silt_frozen_clear(silt_frozen *frozen);
 
 #endif

@@ -45,6 +45,10 @@ typedef struct silt_coupling_type {
      * forces on bodies: force and torque in bodies()->body[] were set by the run. */
     void (*load)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, double dt);
 
+    /** After load: a step of the random walk of suspended grains, if the scene asks for it. viscosity: per cell of the water, Pa s,
+     * with its eddies; step: counts the steps of the run. Grains are where they go at the next start. */
+    void (*walk)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, const double *viscosity, double dt, int64_t step);
+
     /** of the last load and the last substeps */
     void (*exchanged)(const silt_coupling *coupling, silt_exchanged *exchanged);
     /** Points on a body's outline at spacing h, corners kept, in the body's frame; @return how many (none written beyond capacity) */

@@ -911,6 +911,48 @@ static void test_grain_sinks_through_the_worker(void **unused) {
     }
 }
 
+// a parcel of 80 mm that stands for grains of 1 mm: it sinks as they do, and the force on it is theirs all together
+static void test_parcel_sinks_like_its_grains(void **unused) {
+    (void)unused;
+    bench b;
+    bench_init(&b, true);
+    b.def.bed = NULL;
+    b.scene.fluid = (silt_fluid_def){.on = true, .density = 1000, .viscosity = 1e-3, .size = 0.1};
+    b.scene.grains.drag = DRAG_SCHILLER_NAUMANN;
+    b.scene.grains.diameter = 1e-3;
+    OK(dem->open(&b.coupling, &b.def, &error));
+    tank t;
+    tank_open(&t, 10, 10, 0.1);
+    for (int i = 0; i < t.mesh.n_node; i++)
+        t.nodes.p[i] = 9810 * (1 - t.nodes.x[2 * i + 1]);
+    const double usual = 2650 * M_PI / 6 * silt_square(0.08) * 0.08 / (2.0 / 3 * 0.82 * 0.08 / 0.6);
+    const silt_release release = {.x = {0.5, 0.7}, .mass = usual};
+    dem->release(b.coupling, 1, &release);
+    OK(dem->start(b.coupling, 0, &error));
+    OK(dem->finish(b.coupling, &error));
+    const int n = (int)lround(0.01 / dem->step(b.coupling));
+    const double dt = n * dem->step(b.coupling), number = usual / 2650 / (M_PI / 6 * 1e-9);
+    for (int k = 0; k < 60; k++) {
+        const silt_drag *drag;
+        const double before = dem->grains(b.coupling)->v[1];
+        OK(dem->prepare(b.coupling, &t.nodes, &t.mesh, dt, &drag, &error));
+        dem->load(b.coupling, &t.nodes, &t.mesh, dt);
+        OK(dem->start(b.coupling, n, &error));
+        OK(dem->finish(b.coupling, &error));
+        // n_g F(d50), with the coefficient of the speed at the start and implicit in that at the end
+        const double v = dem->grains(b.coupling)->v[1], m = M_PI / 6 * 1e-9 * 2650;
+        const double beta = silt_drag_factor(DRAG_SCHILLER_NAUMANN, 1000, 1e-3, 1e-3, 0, before);
+        const double expected = (before - dt * 9.81 * (1 - 1000.0 / 2650)) / (1 + dt * beta / m);
+        near(v / expected, 1, 1e-3, "velocity of a parcel after a step");
+        silt_exchanged exchanged;
+        dem->exchanged(b.coupling, &exchanged);
+        near(exchanged.grains[1] / (number * (M_PI / 6 * 1e-9 * 9810 - beta * expected)), 1, 1e-3, "force on a parcel");
+    }
+    near(-dem->grains(b.coupling)->v[1] / 0.155101, 1, 1e-3, "terminal velocity of a parcel");
+    tank_close(&t);
+    dem->close(&b.coupling);
+}
+
 static void test_release_deposit_save_load(void **unused) {
     (void)unused;
     bench b;
@@ -1092,6 +1134,7 @@ int main(void) {
         cmocka_unit_test(test_clumps),
         cmocka_unit_test(test_grain_falls_and_leaves),
         cmocka_unit_test(test_grain_sinks_through_the_worker),
+        cmocka_unit_test(test_parcel_sinks_like_its_grains),
         cmocka_unit_test(test_release_deposit_save_load),
         cmocka_unit_test(test_crumbs_fall_like_parcels),
         cmocka_unit_test(test_body_on_the_bed),

@@ -415,6 +415,59 @@ static void test_steps_of_the_water_close(void **unused) {
     tank_close(&t);
 }
 
+// A block of water at rest and grains at 1 as heavy as the water, but small, spread as evenly as its masses: in a step of backward
+// Euler on both sides the relative velocity falls to 1/(1 + 2 dt/tau), whatever dt/tau is: neither overshoots, momentum stays.
+static void test_stiff_drag_on_both_sides(void **unused) {
+    (void)unused;
+    silt_scene scene = {.dimension = 2};
+    scene.fluid = (silt_fluid_def){.on = true, .density = 1000, /* the drag alone is stiff */ .viscosity = 0, .size = 0.01, .tolerance = 1e-9, .iterations = 40,
+                                   .volume_steps = 15, .theta = 1};
+    silt_walls walls = {0};
+    print_message("dt/tau      left     exact e^-2x   momentum open\n");
+    for (double x = 1e-3; x < 2e6; x *= 10) {
+        tank t;
+        silt_fluid fluid = {0};
+        tank_open(&t, 8, 0.01, 0.3);
+        silt_exchange *e = &t.exchange;
+        e->gravity[1] = 0;
+        e->force.def.theta = 1;
+        const double d = 1e-4, density = 1e10, mass = density * M_PI / 6 * d * d * d, tau = mass / (3 * M_PI * 1e-3 * d), dt = x * tau;
+        const double speed = 1e-3 * 0.01 / dt; // the mesh stands nearly still
+        double total = 0;
+        for (int i = 0; i < t.mesh.n_node; i++) {
+            // a grain at every node, which stands for as many as are as heavy as its water
+            SILT_RESERVE(e->grain, e->grain_capacity, e->n_grain + 1);
+            silt_exchange_grain *g = &e->grain[e->n_grain++];
+            double water = 0;
+            for (int k = t.mesh.node_cell_start[i]; k < t.mesh.node_cell_start[i + 1]; k++)
+                water += 1000 * silt_cell_area(t.nodes.x, t.mesh.cell[t.mesh.node_cell[k]]) / 3;
+            *g = (silt_exchange_grain){.x = {t.nodes.x[2 * i], t.nodes.x[2 * i + 1]}, .v = {speed, 0}, .diameter = d, .number = water / mass,
+                                       .solid = water / density, .mass = water, .cell = t.mesh.node_cell[t.mesh.node_cell_start[i]]};
+            for (int a = 0; a < 3; a++)
+                g->weight[a] = t.mesh.cell[g->cell][a] == i;
+            total += water * speed;
+        }
+        OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, dt, &error));
+        const silt_step now = {.scene = &scene, .walls = &walls, .mesh = &t.mesh, .drag = &e->drag, .nodes = &t.nodes, .dt = dt};
+        OK(silt_fluid_step(&fluid, &now, &error));
+        silt_exchange_load(e, fluid.w, t.nodes.p, dt, NULL);
+        double momentum = 0, worst = 0, left = 0;
+        for (int i = 0; i < t.mesh.n_node; i++) {
+            const silt_exchange_grain *g = &e->grain[i];
+            const double v = g->v[0] + dt * g->force[0] / g->mass, u = t.nodes.v[2 * i], gap = (v - u) / speed;
+            momentum += g->mass * v + fluid.mass[i] * u;
+            worst = silt_max(worst, fabs(gap - 1 / (1 + 2 * x)));
+            left = silt_max(left, gap);
+            assert_true(gap >= -1e-9 && v <= speed * (1 + 1e-9) && u >= -1e-9 * speed);
+        }
+        print_message("%-9.0e %.3e  %.3e     %.0e\n", x, left, exp(-2 * x), fabs(momentum / total - 1));
+        near(worst, 0, 1e-6, "relative velocity after a step");
+        near(momentum / total, 1, 1e-9, "momentum of grains and water");
+        silt_fluid_clear(&fluid);
+        tank_close(&t);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_added_mass_stokes),
@@ -425,6 +478,7 @@ int main(void) {
         cmocka_unit_test(test_spin),
         cmocka_unit_test(test_what_grains_gain_the_water_loses),
         cmocka_unit_test(test_steps_of_the_water_close),
+        cmocka_unit_test(test_stiff_drag_on_both_sides),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -44,6 +44,8 @@ void silt_bed_clear(silt_bed *bed);
 void silt_bed_normal(const silt_bed *bed, int node, double *normal);
 /** normal of an exposed edge or face out of the bed, as long as the edge, in space the face's area */
 void silt_bed_facet_normal(const silt_bed *bed, const int facet[3], double *normal);
+/** distance of x from an edge or a face */
+double silt_bed_facet_distance(const silt_bed *bed, const int facet[3], const double *x);
 void silt_bed_patch(const silt_bed *bed, int node, silt_patch *patch);
 /** Takes the patch out of the bed: its cells vanish, nodes without cells die (their fluid_node stays for the caller to read),
  * newly exposed ones start with the excess over W_c, shared over their lengths of surface, at most one layer. The pore water

@@ -13,39 +13,6 @@
 
 static double dot3(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// distance of x from the triangle p, q, r
-static double triangle_distance(const double *p, const double *q, const double *r, const double *x) {
-    const double *corner[3] = {p, q, r};
-    double u[3], v[3], w[3], square = HUGE_VAL;
-    for (int d = 0; d < 3; d++) {
-        u[d] = q[d] - p[d];
-        v[d] = r[d] - p[d];
-        w[d] = x[d] - p[d];
-    }
-    // the foot inside, else the nearest of the sides
-    const double uu = dot3(u, u), vv = dot3(v, v), uv = dot3(u, v), wu = dot3(w, u), wv = dot3(w, v), under = uu * vv - uv * uv;
-    if (under > 0) {
-        const double a = (vv * wu - uv * wv) / under, b = (uu * wv - uv * wu) / under;
-        if (a >= 0 && b >= 0 && a + b <= 1) {
-            const double off = bed_volume6(p, q, r, x);
-            return fabs(off) / sqrt(under);
-        }
-    }
-    for (int k = 0; k < 3; k++) {
-        const double *a = corner[k], *b = corner[(k + 1) % 3];
-        double along = 0, length = 0, near = 0;
-        for (int d = 0; d < 3; d++) {
-            along += (x[d] - a[d]) * (b[d] - a[d]);
-            length += silt_square(b[d] - a[d]);
-        }
-        const double t = length > 0 ? silt_clamp(along / length, 0, 1) : 0;
-        for (int d = 0; d < 3; d++)
-            near += silt_square(x[d] - a[d] - t * (b[d] - a[d]));
-        square = silt_min(square, near);
-    }
-    return sqrt(square);
-}
-
 // true when the segment a-b goes through the inside of the triangle
 static bool segment_crosses(const double *a, const double *b, const double *p, const double *q, const double *r) {
     const double from = bed_volume6(p, q, r, a), to = bed_volume6(p, q, r, b);
@@ -208,7 +175,7 @@ static bool growth_clear(const silt_bed *bed, double size, const bed_growth3 *gr
                      silt_max(p[d], silt_max(q[d], r[d])) < lo[d] - GROW_APART * size;
         if (apart || growth_has(growth, e))
             continue;
-        if (triangle_distance(p, q, r, growth->x) < GROW_APART * size)
+        if (silt_bed_facet_distance(bed, bed->edge[e], growth->x) < GROW_APART * size)
             return false;
         for (int k = 0; k < growth->n; k++)
             for (int a = 0; a < 3; a++) {
@@ -294,7 +261,7 @@ int silt_bed_face_below(const silt_bed *bed, const double *x, double reach, doub
         const double *p = bed->x[bed->edge[e][0]], *q = bed->x[bed->edge[e][1]], *r = bed->x[bed->edge[e][2]];
         if (bed_volume6(p, q, r, x) <= 0)
             continue;
-        const double near = triangle_distance(p, q, r, x);
+        const double near = silt_bed_facet_distance(bed, bed->edge[e], x);
         if (near <= reach && (below < 0 || near < *distance)) {
             *distance = near;
             below = e;

@@ -449,6 +449,44 @@ bool silt_bed_near(const silt_bed *bed, const double *x, double reach) {
     return false;
 }
 
+// distance of x from the triangle p, q, r
+static double triangle_distance(const double *p, const double *q, const double *r, const double *x) {
+    const double *corner[3] = {p, q, r};
+    double u[3], v[3], w[3], square = HUGE_VAL;
+    for (int d = 0; d < 3; d++) {
+        u[d] = q[d] - p[d];
+        v[d] = r[d] - p[d];
+        w[d] = x[d] - p[d];
+    }
+    // the foot inside, else the nearest of the sides
+    const double uu = silt_dot(3, u, u), vv = silt_dot(3, v, v), uv = silt_dot(3, u, v), wu = silt_dot(3, w, u), wv = silt_dot(3, w, v), under = uu * vv - uv * uv;
+    if (under > 0) {
+        const double a = (vv * wu - uv * wv) / under, b = (uu * wv - uv * wu) / under;
+        if (a >= 0 && b >= 0 && a + b <= 1) {
+            const double off = bed_volume6(p, q, r, x);
+            return fabs(off) / sqrt(under);
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        const double *a = corner[k], *b = corner[(k + 1) % 3];
+        double along = 0, length = 0, near = 0;
+        for (int d = 0; d < 3; d++) {
+            along += (x[d] - a[d]) * (b[d] - a[d]);
+            length += silt_square(b[d] - a[d]);
+        }
+        const double t = length > 0 ? silt_clamp(along / length, 0, 1) : 0;
+        for (int d = 0; d < 3; d++)
+            near += silt_square(x[d] - a[d] - t * (b[d] - a[d]));
+        square = silt_min(square, near);
+    }
+    return sqrt(square);
+}
+
+double silt_bed_facet_distance(const silt_bed *bed, const int facet[3], const double *x) {
+    const double *p = bed->x[facet[0]], *q = bed->x[facet[1]];
+    return bed_dim(bed) == 3 ? triangle_distance(p, q, bed->x[facet[2]], x) : bed_segment_distance(p, q, x);
+}
+
 static double edge_level(const double *p, const double *q, double x) {
     const double reach = fabs(q[0] - p[0]);
     if (x < silt_min(p[0], q[0]) || x > silt_max(p[0], q[0]))

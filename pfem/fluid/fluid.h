@@ -33,7 +33,7 @@ typedef struct silt_step {
 /** working space and results of a step; arrays grow only */
 typedef struct silt_fluid {
     int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity,
-        potential_capacity, stand_capacity, level_capacity, level_brake_capacity;
+        potential_capacity, stand_capacity, bed_force_capacity, still_capacity, level_capacity, level_brake_capacity;
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
@@ -46,6 +46,8 @@ typedef struct silt_fluid {
     double *shift;        // owned, dim per node, m/s: carries positions, not momentum, to where debts are paid; NULL without volume control
     double *level_force;  // owned, dim per node, N, of the water behind openings with a level; NULL without such openings
     double *level_brake;  // owned, per node, kg/s, part of friction: pressure that water loses as it comes in, over its speed
+    uint8_t *still;       // owned, per node, 1: slips on the bed, stays in its place whatever its velocity; NULL without slip on a bed
+    double *bed_force;    // owned, dim per node, N: what a bent bed would push water at rest along with, taken back; NULL without slip on a bed
     double *stand;        // owned, per node, kg/s, added to both sides where explicit viscosity would not be stable; NULL without
     double *potential;    // owned, per node, Pa, density times the potential of a central body force at x_mid; NULL without one
     double *belt;         // owned, dim per node, velocity of a wall's surface along itself; NULL without such walls
@@ -103,8 +105,10 @@ void silt_fluid_clear(silt_fluid *fluid);
  * positions move with, debts are paid by what was asked; positions are untouched. On failure the nodes are as before.
  * Errors: SILT_FAILED with what did not converge and where. */
 silt_status silt_fluid_step(silt_fluid *fluid, const silt_step *step, silt_error *err);
-/** component k of the velocity that the mesh moves with: w, the debts' shift, less a belt's own motion */
+/** component k of the velocity that the mesh moves with: w, the debts' shift, less a belt's own motion; none on the bed */
 static inline double silt_mesh_velocity(const silt_fluid *f, int k) {
+    if (f->still && f->still[k / f->dim])
+        return 0;
     return f->w[k] + (f->shift ? f->shift[k] : 0) - (f->belt ? f->belt[k] : 0);
 }
 
@@ -133,6 +137,8 @@ int silt_level_sides(const silt_walls *walls, const silt_opening *opening, const
 void silt_level_way(const silt_opening *opening, int n, const double *const side[3], double way[3]);
 /** how a node on an opening with a level is held: silt_walls_hold */
 silt_hold silt_level_hold(const silt_step *step, int i, double vector[3]);
+/** area vector of a facet with the nodes at x, out of the water */
+void silt_facet_vector(const silt_mesh *mesh, int dim, const double *x, const int *facet, double vector[3]);
 /** Pressure of the water behind openings, p = rho g (level - height), less rho u^2/2 where it comes in: level_force and
  * level_brake, the latter added to friction. */
 void silt_levels_load(silt_fluid *fluid, const silt_step *step);
@@ -221,10 +227,12 @@ void silt_pressure_forget(silt_pressure *pressure);
 void silt_fluid_correct(silt_fluid *fluid, const silt_step *step, const double *q, double *v);
 
 // seepage.c -----------------------------------------------------------------------------------------------
+/** once a step */
+void silt_seepage_begin(silt_fluid *fluid, const silt_step *step);
 /** what the bed takes from each node at the pressure p, m3/s */
-const double *silt_seepage_taken(silt_fluid *fluid, const double *p);
-/** increment = (S + L + B)^-1 right, B what the bed takes of the water for its pressure: conjugate gradients with silt_pressure_solve
- * before them, to `tolerance` relative to the right side. */
+const double *silt_seepage_taken(silt_fluid *fluid, const silt_mesh *mesh, const double *p);
+/** increment = (S + L + B)^-1 right, B what the bed takes of the water for its pressure: flexible GMRES with silt_pressure_solve
+ * before it, to `tolerance` relative to the right side. */
 silt_status silt_seepage_solve(silt_fluid *fluid, const silt_step *step, const double *right, double tolerance, double *increment,
                                silt_error *err);
 
@@ -233,7 +241,7 @@ silt_status silt_seepage_solve(silt_fluid *fluid, const silt_step *step, const d
 silt_status silt_stiff_factor(silt_stiff **stiff, silt_fluid *fluid, const silt_step *step, bool pressure, silt_error *err);
 /** whether there is such a factor of the present step */
 bool silt_stiff_ready(const silt_stiff *stiff, bool pressure);
-/** the step is over */
+/** the step is over, or factors are of no more use in it */
 void silt_stiff_end(silt_stiff *stiff);
 /** out = (inertia + K)^-1 right on the free components */
 void silt_stiff_momentum(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *out);

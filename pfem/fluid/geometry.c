@@ -213,7 +213,7 @@ static bool midpoints(silt_fluid *f, const double *x, double dt) {
     double *x_mid = f->x_mid;
     const double *w = f->w, *shift = f->shift, half = 0.5 * dt;
     const int n = f->dim * f->n_node;
-    const int sure = f->belt ? 0 : n;
+    const int sure = f->belt || f->still ? 0 : n;
     SILT_PRAGMA(omp parallel for schedule(static) num_threads(silt_threads(n)) reduction(|:moved))
     for (int k = 0; k < sure; k++) {
         const double to = x[k] + half * (shift ? w[k] + shift[k] : w[k]);

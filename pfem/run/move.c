@@ -320,7 +320,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
             for (int k = D * i; k < D * (i + 1); k++)
                 nodes->x[k] += run->dt * silt_mesh_velocity(&run->fluid, k);
     const double moved = silt_mesh_volume(mesh, nodes->x);
-    // inlets stay on their line: what they leave behind them is new water; slip nodes of the bed stay too
+    // inlets stay on their line: what they leave behind them is new water
     for (int i = 0; i < n; i++)
         if (nodes->kind[i] == NODE_INLET)
             memcpy(nodes->x + D * i, run->x_old + D * i, (size_t)D * sizeof(double));
@@ -339,8 +339,6 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
 
     // from here on positions are mended: what that does to the volume is booked by the rebuild
     for (int i = 0; i < n; i++) {
-        if (nodes->kind[i] == NODE_BED && run->fluid.hold[i] != HOLD_ALL)
-            memcpy(nodes->x + D * i, run->x_old + D * i, (size_t)D * sizeof(double));
         if (!mesh->wet[i] && nodes->kind[i] == NODE_FLUID)
             fly(run, i);
     }
