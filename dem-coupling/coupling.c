@@ -525,6 +525,9 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
 
 static void coupling_leave(silt_coupling *c, coupling_grain *g) {
     silt_sum(&c->left_mass, &c->left_rest, g->mass);
+    const int i = (int)(g - c->grain);
+    if (i < c->n_loaded && c->exchange.grain[i].cell >= 0)
+        c->left_solid += c->exchange.grain[i].immersed;
     c->left_count++;
     coupling_take(c, g);
 }
@@ -547,21 +550,13 @@ static void coupling_receive(silt_coupling *c, coupling_grain *g, const silt_dem
     g->net = silt_length(c->dim, net);
 }
 
-// a grain that LIGGGHTS no longer has: over an outlet, or lost
-static bool coupling_left_domain(const silt_coupling *c, const coupling_grain *g) {
-    double ahead[3];
-    for (int d = 0; d < 3; d++)
-        ahead[d] = g->old_x[d] + 2.0 * c->elapsed * g->v[d];
-    return silt_coupling_leaves(c, g->old_x, ahead, 4.0 * g->radius);
-}
-
 // nothing is changed before it is sure that no grain is lost
 static silt_status coupling_complete(const silt_coupling *c, const silt_dem_state *state, silt_error *err) {
     for (int i = 0, k = 0; i < c->n_grain && state->n_grain != c->n_grain; i++) {
         const coupling_grain *g = &c->grain[i];
         while (k < state->n_grain && state->id[k] < g->id)
             k++;
-        if (!g->fixed && (k == state->n_grain || state->id[k] != g->id) && !coupling_left_domain(c, g))
+        if (!g->fixed && (k == state->n_grain || state->id[k] != g->id) && !silt_coupling_left_domain(c, g))
             return silt_fail(
                 err, SILT_FAILED,
                 "grain %lld vanished: last seen at (%g, %g) with the velocity (%g, %g) m/s and the radius %g m; it "
@@ -742,8 +737,9 @@ static int coupling_outline(const silt_coupling *c, int body, double h, double *
     return silt_outline_nodes(&c->body[body].shape, h, point, capacity);
 }
 
-static void coupling_left(const silt_coupling *c, double *mass, int64_t *count) {
+static void coupling_left(const silt_coupling *c, double *mass, double *solid, int64_t *count) {
     *mass = c->left_mass;
+    *solid = c->left_solid;
     *count = c->left_count;
 }
 
