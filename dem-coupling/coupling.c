@@ -134,11 +134,8 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     c->exchange.density = scene->fluid.density;
     c->exchange.viscosity = scene->fluid.viscosity;
     c->exchange.refresh = true;
-    c->exchange.force.def = (silt_force_def){.added_mass = grains->added_mass,
-                                             .theta = scene->fluid.theta,
-                                             .viscous = grains->viscous_force,
-                                             .lift = grains->lift == LIFT_SAFFMAN,
-                                             .spin = grains->rotational_drag};
+    c->exchange.force.def = (silt_force_def){grains->added_mass, scene->fluid.theta, grains->viscous_force,
+                                             grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     memcpy(c->exchange.gravity, scene->gravity, sizeof c->exchange.gravity);
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
@@ -154,6 +151,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .period = period_share * 2.0 * largest,
         .gravity = {scene->gravity[0], scene->gravity[1], scene->gravity[2]},
         .youngs_modulus = contact->youngs_modulus,
+        .wall_modulus = contact->wall_modulus,
         .poissons_ratio = contact->poissons_ratio,
         .restitution = contact->restitution,
         .friction = contact->friction,
@@ -231,6 +229,7 @@ static const silt_grain_state *coupling_grains(const silt_coupling *c) {
     SILT_RESERVE(w->net, w->capacity[6], n);
     SILT_RESERVE(w->contacts, w->capacity[7], n);
     SILT_RESERVE(w->on_bed, w->capacity[8], n);
+    SILT_RESERVE(w->contact, w->capacity[9], 3 * n);
     SILT_RESERVE(w->map, w->map_capacity, n);
     for (int i = 0; i < n; i++) {
         const coupling_grain *g = &c->grain[i];
@@ -243,6 +242,7 @@ static const silt_grain_state *coupling_grains(const silt_coupling *c) {
         w->radius[count] = g->radius;
         w->mass[count] = g->mass;
         w->net[count] = g->net;
+        memcpy(w->contact + 3 * count, g->contact, sizeof g->contact);
         w->contacts[count] = g->contacts;
         w->on_bed[count] = g->on_bed;
         w->map[count++] = i;
@@ -256,6 +256,7 @@ static const silt_grain_state *coupling_grains(const silt_coupling *c) {
                                   .mass = w->mass,
                                   .contacts = w->contacts,
                                   .on_bed = w->on_bed,
+                                  .contact = w->contact,
                                   .net_force = w->net};
     w->fresh = true;
     return &w->state;
@@ -424,7 +425,7 @@ static silt_status coupling_prepare(silt_coupling *c, const silt_nodes *nodes, c
 static void coupling_load(silt_coupling *c, const silt_nodes *nodes, const silt_mesh *mesh, double dt) {
     (void)mesh; // the exchange holds on to the one of prepare
     if (c->wet)
-        silt_exchange_load(&c->exchange, nodes->v, nodes->p, dt);
+        silt_exchange_load(&c->exchange, nodes->v, nodes->p, dt, nodes->x);
     else
         c->exchange.totals = (silt_exchange_totals){0};
     for (int i = 0; i < c->n_grain; i++) {
@@ -505,6 +506,7 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
             c->force[3 * k + d] = g->force[d] * c->width * silt_coupling_burden(c, g);
     }
     silt_coupling_twist(c);
+    silt_coupling_shift(c);
     for (int i = 0; i < c->bodies->count; i++)
         for (int k = 0; k < 3; k++) {
             c->body_force[3 * i + k] = c->bodies->body[i].force[k] * c->width;
@@ -522,7 +524,7 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
 }
 
 static void coupling_leave(silt_coupling *c, coupling_grain *g) {
-    c->left_mass += g->mass;
+    silt_sum(&c->left_mass, &c->left_rest, g->mass);
     c->left_count++;
     coupling_take(c, g);
 }
@@ -714,10 +716,11 @@ static void coupling_close(silt_coupling **coupling) {
     free(c->bodies->body);
     free(c->bodies);
     coupling_view *w = c->view;
-    void *owned[] = {w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
+    void *owned[] = {w->contact, w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
                      c->body,     c->body_force, c->body_torque, c->force, c->add,    c->torque,
-                     c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate};
+                     c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate,
+                     c->eddy,     c->shift,      c->walk};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);
@@ -781,6 +784,7 @@ const silt_coupling_type silt_coupling_dem = {
     .bodies = coupling_bodies,
     .prepare = coupling_prepare,
     .load = coupling_load,
+    .walk = silt_coupling_walk,
     .exchanged = coupling_exchanged,
     .outline = coupling_outline,
     .room = coupling_room,

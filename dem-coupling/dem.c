@@ -28,7 +28,7 @@ struct silt_dem {
     int n_remove, cap_remove, n_add, cap_add;
     int64_t *remove;      // owned
     silt_dem_sphere *add; // owned
-    const double *torque; // borrowed, of the next run, NULL: none
+    const double *torque, *shift; // borrowed, of the next run, NULL: none
     double (*rate)[4]; // owned, velocity and spin of every motion
     int n_solid, cap_solid, n_free, n_free_sphere;
     dem_solid *solid; // owned
@@ -150,6 +150,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->periodic = def->periodic;
     s->period = def->period;
     s->youngs_modulus = def->youngs_modulus;
+    s->wall_modulus = def->wall_modulus > 0 ? def->wall_modulus : def->youngs_modulus;
     s->poissons_ratio = def->poissons_ratio;
     s->restitution = def->restitution;
     s->friction = def->friction;
@@ -164,7 +165,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->no_contacts = def->no_contacts;
     s->n_body = bodies ? dem->n_free : 0;
     s->n_body_sphere = bodies ? dem->n_free_sphere : 0;
-    s->n_remove = s->n_add = s->n_force = s->n_torque = 0;
+    s->n_remove = s->n_add = s->n_force = s->n_torque = s->n_shift = 0;
     s->max_grain = max_grain;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
@@ -526,6 +527,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     s->n_add = dem->n_add + n_fixed;
     s->n_force = force ? dem->state.n_grain : 0;
     s->n_torque = dem->torque ? dem->state.n_grain : 0;
+    s->n_shift = dem->shift ? dem->state.n_grain : 0;
     s->max_grain = n_grain + dem->n_add;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
@@ -537,7 +539,9 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         memcpy(DEM_SECTION(s, double, force), force, 3 * (size_t)dem->state.n_grain * sizeof(double));
     if (dem->torque)
         memcpy(DEM_SECTION(s, double, torque), dem->torque, 3 * (size_t)s->n_torque * sizeof(double));
-    dem->torque = NULL;
+    if (dem->shift)
+        memcpy(DEM_SECTION(s, double, shift), dem->shift, 3 * (size_t)s->n_shift * sizeof(double));
+    dem->torque = dem->shift = NULL;
     for (int k = 0; k < dem->n_solid; k++) {
         if (dem->solid[k].slot < 0)
             continue;
@@ -551,6 +555,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
 }
 
 void silt_dem_twist(silt_dem *dem, const double *torque) { dem->torque = torque; }
+void silt_dem_shift(silt_dem *dem, const double *shift) { dem->shift = shift; }
 
 void silt_dem_keep(silt_dem *dem) {
     dem->keep = true;

@@ -20,6 +20,7 @@ typedef struct silt_dem_def {
     bool periodic;       // in x: what leaves the box there comes in at the other end
     double period;       // m, slab: periodic length in z (at least 3 times the largest sphere's diameter)
     double gravity[3];
+    double wall_modulus; // Pa, of the walls; 0: youngs_modulus
     double youngs_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
     double step; // s, DEM time step, fixed for the run
     int n_wall;
@@ -94,6 +95,8 @@ void silt_dem_twist(silt_dem *dem, const double *torque);
  * plane from x to y, in space from x to z; and where they stand at the end of the next run, the numbers of the definition's walls or
  * triangles. */
 void silt_dem_move_walls(silt_dem *dem, const double (*rate)[4], const double *wall);
+/** Steps aside before the next run, 3 per grain in the order of the last state, m; borrowed until then */
+void silt_dem_shift(silt_dem *dem, const double *shift);
 /** The next run may go on from where the last one ended, with its neighbour lists and without a set-up. A run is set up all the
  * same when there are edits or free bodies, and after a save or load. How the lists came about decides the order of sums: the
  * same bits come again only when set-ups come at the same steps again. */

@@ -5,6 +5,7 @@
 
 static const double kernel_reach = 6.0; // kernel widths in the plane; the kernel falls off with exp(-2 r/width)
 static const double sweep_reach = 3.0;  // in space, where it falls off with exp(-(r/width)^2)
+static const double solid_bound = 0.9;  // largest solid fraction in space
 static const double flat_cell =
     0.05; // of its area: a cell flatter than this at the middle of the step counts as at its start
 
@@ -46,12 +47,14 @@ EXCHANGE midpoint(const int D, const silt_exchange *e, double dt) {
 // nodes at the middle of the step, where the water's forces see them, for the velocity that was seen last
 static void exchange_midpoint(silt_exchange *e, double dt) { BY_DIM(e, midpoint, e, dt); }
 
-// corners of a cell from the first one, the shortest way across a periodic border
+// edges of a cell, from the first corner, the shortest way across a periodic border
 EXCHANGE edges(const int D, const silt_exchange *e, const double *x, const int *at, double edge[3][3]) {
     const double period = e->mesh->period[0];
-    for (int a = 0; a < D; a++) {
+    for (int a = 0; a < 3; a++) {
+        // in the plane the third one is that across from the first corner
+        const int from = at[D == 2 && a == 2 ? 1 : 0], to = at[D == 2 && a == 2 ? 2 : a + 1];
         for (int d = 0; d < D; d++)
-            edge[a][d] = x[D * at[a + 1] + d] - x[D * at[0] + d];
+            edge[a][d] = x[D * to + d] - x[D * from + d];
         if (period > 0.0)
             edge[a][0] -= period * floor(edge[a][0] / period + 0.5);
     }
@@ -64,6 +67,8 @@ EXCHANGE gradients(const int D, double u[3][3], double slope[4][3]) {
         slope[1][1] = -u[1][0] / 6.0;
         slope[2][0] = -u[0][1] / 6.0;
         slope[2][1] = u[0][0] / 6.0;
+        slope[0][0] = -u[2][1] / 6.0;
+        slope[0][1] = u[2][0] / 6.0;
     }
     for (int a = 0; a < 3 && D == 3; a++) {
         const double *p = u[(a + 1) % 3], *q = u[(a + 2) % 3];
@@ -95,11 +100,8 @@ EXCHANGE exchange_slope(const int D, const silt_exchange *e, const exchange_cell
             for (int d = 0; d < 3; d++)
                 slope[a][d] += more[a][d] / 3.0;
     }
-    for (int d = 0; d < D; d++) {
-        slope[0][d] = 0.0;
-        for (int a = 1; a <= D; a++)
-            slope[0][d] -= slope[a][d];
-    }
+    for (int d = 0; d < 3 && D == 3; d++)
+        slope[0][d] = -(slope[1][d] + slope[2][d] + slope[3][d]);
 }
 
 EXCHANGE smooth(const int D, silt_exchange *e, const double *water) {
@@ -158,7 +160,7 @@ static void exchange_pack(silt_exchange *e, double dt) {
             diameter[i] = g->diameter;
             number[i] = idle ? 0.0 : g->number;
             to->pace[i] = g->held ? 0.0 : dt / g->mass;
-            to->solid[i] = idle ? 0.0 : g->solid;
+            to->solid[i] = idle ? 0.0 : g->immersed;
             for (int k = 0; k < D; k++) {
                 to->v[k][i] = g->v[k];
                 to->start[k][i] = g->v[k] + (g->held ? 0.0 : dt * e->gravity[k] + to->pace[i] * g->contact[k]);
@@ -505,6 +507,35 @@ static void exchange_look(silt_exchange *e) {
     }
 }
 
+// solid fraction
+static void exchange_solid(silt_exchange *e) {
+    const silt_mesh *mesh = e->mesh;
+    memset(e->solid, 0, (size_t)e->n_node * sizeof *e->solid);
+    for (int p = 0; p < e->n_wet; p++) {
+        const silt_exchange_grain *g = &e->grain[e->wet[p]];
+        for (int a = 0; a <= e->dim; a++)
+            e->solid[mesh->cell[g->cell][a]] += g->weight[a] * g->immersed;
+    }
+    silt_kernel_smooth(&e->kernel, e->solid);
+}
+
+// Where there is more solid than room for it, in drops of spray that are smaller than a grain, the grains are but half in the water:
+// more than this share turned the water's pressure round, and shot the drop away. @return whether any is
+static bool exchange_bound(silt_exchange *e) {
+    bool any = false;
+    for (int p = 0; p < e->n_wet; p++) {
+        silt_exchange_grain *g = &e->grain[e->wet[p]];
+        double solid = 0.0;
+        for (int a = 0; a <= e->dim; a++)
+            solid += g->weight[a] * e->solid[e->mesh->cell[g->cell][a]];
+        if (solid <= solid_bound)
+            continue;
+        g->immersed *= solid_bound / solid;
+        any = true;
+    }
+    return any;
+}
+
 // true when mesh and grains stand where they stood at the last place
 bool silt_exchange_stands(const silt_exchange *e, const silt_nodes *nodes, const silt_mesh *mesh) {
     return e->placed && e->mesh == mesh && e->revision == mesh->revision && e->n_node == mesh->n_node &&
@@ -532,14 +563,11 @@ silt_status silt_exchange_place(silt_exchange *e, const silt_nodes *nodes, const
     SILT_RESERVE(e->read, e->node_capacity[4], READ_FIELDS(D) * (e->n_look + 1));
     SILT_RESERVE(e->give, e->node_capacity[5], GIVE_FIELDS * (e->n_look + 1));
 
-    // solid fraction
-    memset(e->solid, 0, (size_t)n * sizeof *e->solid);
-    for (int p = 0; p < e->n_wet; p++) {
-        const silt_exchange_grain *g = &e->grain[e->wet[p]];
-        for (int a = 0; a <= D; a++)
-            e->solid[mesh->cell[g->cell][a]] += g->weight[a] * g->solid;
-    }
-    silt_kernel_smooth(&e->kernel, e->solid);
+    for (int p = 0; p < e->n_wet; p++)
+        e->grain[e->wet[p]].immersed = e->grain[e->wet[p]].solid;
+    exchange_solid(e);
+    if (D == 3 && exchange_bound(e))
+        exchange_solid(e);
     e->drag = (silt_drag){.solid = e->solid,
                           .coefficient = e->coefficient,
                           .push = e->push,
@@ -571,15 +599,17 @@ silt_status silt_exchange_prepare(silt_exchange *e, const silt_nodes *nodes, con
     return SILT_OK;
 }
 
-void silt_exchange_load(silt_exchange *e, const double *velocity, const double *pressure, double dt) {
+void silt_exchange_load(silt_exchange *e, const double *velocity, const double *pressure, double dt, const double *middle) {
+    const int D = e->dim;
     silt_exchange_totals *t = &e->totals;
     *t = (silt_exchange_totals){0};
     if (dt != e->dt) // the water was told of another step than it took: nothing to hold on to but the new one
         exchange_update(e, velocity, pressure, dt);
     // the pressure on the grains acts where the water's does: on the mesh of the last iterate
     exchange_midpoint(e, dt);
+    for (int k = 0; k < e->n_look && middle; k++)
+        memcpy(e->middle + D * k, middle + D * e->look[k], (size_t)D * sizeof *middle);
     exchange_gather(e, velocity, pressure, e->spare);
-    const int D = e->dim;
     for (int m = 0; m < e->n_look; m++)
         for (int k = 0, i = e->look[m]; k < D; k++)
             t->water[k] += e->push[D * i + k] - e->coefficient[i] * e->spare[(D + 1) * m + k];

@@ -28,6 +28,7 @@ typedef struct silt_exchange_grain {
     bool held;         // stays as fast as it is, whatever acts on it
     int cell;          // of the water's mesh, -1: not in the water
     double weight[4];  // barycentric, in that cell
+    double immersed;   // m3, result of place: what of its solid displaces water; less in a drop that is smaller than the grain
     // results of load
     double water[3];    // m/s, the water's velocity at the grain
     double effective;   // kg/(s m), beta_eff
@@ -119,8 +120,9 @@ void silt_exchange_begin(silt_exchange *exchange, const silt_nodes *nodes, doubl
 silt_status silt_exchange_prepare(silt_exchange *exchange, const silt_nodes *nodes, const silt_mesh *mesh, double dt,
                                   silt_error *err);
 /** Final forces on the grains and the totals, from the accepted velocity (that the mesh moves with, as in update) and
- * pressure. Coefficients, free velocities and cells are those of the last update: what the water felt. */
-void silt_exchange_load(silt_exchange *exchange, const double *velocity, const double *pressure, double dt);
+ * pressure. Coefficients, free velocities and cells are those of the last update: what the water felt.
+ * @param middle  the water's midpoint mesh, dim numbers per node, on which its pressure acted; NULL: that of the last update */
+void silt_exchange_load(silt_exchange *exchange, const double *velocity, const double *pressure, double dt, const double *middle);
 /** A third (space: a quarter) of a near cell's measure times the gradients of its shape functions, at the middle of the step */
 void silt_exchange_slope(const silt_exchange *exchange, int near, double slope[4][3]);
 void silt_exchange_clear(silt_exchange *exchange);

@@ -65,8 +65,8 @@ silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const 
             kernel->place[i] = kernel->n_node;
         for (int k = 0; k < kernel->n_node; k++)
             kernel->place[kernel->node[k]] = k;
-        silt_sweep_build(&kernel->sweep, mesh, kernel->n_node, kernel->node, kernel->place, kernel->volume, kernel->edge,
-                         width * width / 4.0);
+        silt_sweep_build(&kernel->sweep, mesh, kernel->n_node, kernel->node, kernel->place, kernel->n_near, kernel->near, kernel->volume,
+                         width * width / 4.0, kernel->edge);
         return SILT_OK;
     }
     // a node without a cell keeps what is asked of it

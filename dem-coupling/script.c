@@ -64,14 +64,14 @@ static void script_materials(void *lmp, const dem_shared *s) {
     const int n = DEM_TYPE_DEAD;
     char value[COMMAND_LENGTH], friction[COMMAND_LENGTH];
 
-    if (s->youngs_modulus < 5e6)
+    if (fmin(s->youngs_modulus, s->wall_modulus) < 5e6)
         script_say(lmp, "soft_particles yes");
-    if (s->youngs_modulus > 1e9)
+    if (fmax(s->youngs_modulus, s->wall_modulus) > 1e9)
         script_say(lmp, "hard_particles yes");
     // one value per type
     int used = 0;
     for (int i = 0; i < n; i++)
-        used += snprintf(value + used, sizeof value - (size_t)used, " %.17g", s->youngs_modulus);
+        used += snprintf(value + used, sizeof value - (size_t)used, " %.17g", i + 1 == DEM_TYPE_WALL ? s->wall_modulus : s->youngs_modulus);
     script_say(lmp, "fix m1 all property/global youngsModulus peratomtype%s", value);
     used = 0;
     for (int i = 0; i < n; i++)

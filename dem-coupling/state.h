@@ -32,9 +32,9 @@ typedef struct coupling_grain {
 typedef struct coupling_view {
     silt_grain_state state;
     bool fresh; // shows the grains as they are
-    int capacity[9], map_capacity;
+    int capacity[10], map_capacity;
     int64_t *id;
-    double *x, *v, *omega, *radius, *mass, *net;
+    double *x, *v, *omega, *radius, *mass, *net, *contact;
     int *contacts, *map; // map: index into the grains
     uint8_t *on_bed;
 } coupling_view;
@@ -85,11 +85,15 @@ struct silt_coupling {
     double *body_force, *body_torque; // owned, 3 per body, N and N m of the slab
     int force_capacity, torque_capacity, add_capacity;
     double *force;        // owned, 3 per grain, N
+    bool walks;           // shift holds steps of the random walk for the next substeps
+    int eddy_capacity, shift_capacity, walk_capacity;
+    double *eddy;         // owned, 2 per node, eddy diffusivity times size and size; so are the others NULL without random walk
+    double *shift, *walk; // owned, m, 3 per grain; the same in LIGGGHTS' order
     double *torque;       // owned, 3 per grain, N m; NULL where the water exerts none
     silt_dem_sphere *add; // owned
     double elapsed;       // s, of the running substeps
     double contact[3];    // N/m, of contacts on all grains, of the last substeps
-    double left_mass;
+    double left_mass, left_rest; // and what rounding left out of it (silt_sum)
     int64_t left_count;
     silt_error refused; // why a release cannot be; returned by the next start
 };
@@ -106,6 +110,14 @@ double silt_coupling_burden(const silt_coupling *coupling, const coupling_grain 
 // walk.c
 /** What holds a fixed grain against water and weight counts as contact. */
 void silt_coupling_hold(silt_coupling *coupling, coupling_grain *grain);
+// suspend.c
+/** A step of the random walk of the grains that are suspended in water, after load and before start. viscosity: per cell, Pa s, of
+ * the water with its eddies. The random numbers hang on fluid.seed, the step and the grain's id. */
+void silt_coupling_walk(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, const double *viscosity, double dt,
+                        int64_t step);
+/** Tells LIGGGHTS of it. */
+void silt_coupling_shift(silt_coupling *coupling);
+
 /** The water's torques on grains for the next substeps; nothing where grains.rotational_drag is off. */
 void silt_coupling_twist(silt_coupling *coupling);
 /** true when the way from a to b leads over an outlet out of the water, or a is within `near` of one */

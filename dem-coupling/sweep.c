@@ -4,8 +4,8 @@
 #include "parallel.h"
 #include "vector.h"
 
-static const double sweep_left = 0.05;   // what is left of the roughest fields
-static const double sweep_cap = 10.0;    // see sweep_bound
+static const double sweep_left = 0.02;   // what is left of the roughest fields
+static const double sweep_cap = 10.0;    // see sweep_soften
 static const double sweep_sliver = 0.02; // of a regular tetrahedron: gradients are bounded as if a cell had this share of its volume
 
 double silt_sweep_cell(const double c[12], double t, double edge[6]) {
@@ -32,16 +32,45 @@ double silt_sweep_cell(const double c[12], double t, double edge[6]) {
 
 // ---------------------------------------------------------------- the matrix
 
-// rows of M^-1 K
-static void sweep_rows(silt_sweep *w, const silt_mesh *mesh, const int *node, const int *place, const double *volume,
+static const int sweep_pair[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}}; // place of an edge
+
+// Slivers make rows that are many times what a good mesh has, about 5 t M^(1/3), and ask for twice as many sweeps. Whole cells are
+// made less stiff, and count only where all their nodes are held: the sum stays positive semi-definite, without which a
+// polynomial is no kernel.
+static void sweep_soften(silt_sweep *w, const silt_mesh *mesh, int n_near, const int *near, const int *place, const double *volume,
+                         double t, double *edge) {
+    memset(w->row, 0, (size_t)(w->n + 1) * sizeof *w->row);
+    for (int k = 0; k < n_near; k++) {
+        const int e = near[k], *cell = mesh->cell[e];
+        bool whole = true;
+        for (int a = 0; a < 4; a++)
+            whole &= place[cell[a]] < w->n;
+        for (int c = 0; c < 6 && !whole; c++)
+            edge[6 * e + c] = 0.0;
+        for (int a = 0; a < 4; a++)
+            for (int b = 0; b < 4; b++)
+                w->row[place[cell[a]]] -= a == b ? 0.0 : edge[6 * e + sweep_pair[a][b]];
+    }
+    for (int k = 0; k < n_near; k++) {
+        const int e = near[k], *cell = mesh->cell[e];
+        double share = 1.0;
+        for (int a = 0; a < 4; a++)
+            if (place[cell[a]] < w->n)
+                share = silt_min(share, sweep_cap * t * cbrt(volume[cell[a]]) / silt_max(w->row[place[cell[a]]], 1e-300));
+        for (int c = 0; c < 6 && share < 1.0; c++)
+            edge[6 * e + c] *= share;
+    }
+}
+
+// rows of M^-1 K. @return the largest eigenvalue that they can have (Gershgorin)
+static double sweep_rows(silt_sweep *w, const silt_mesh *mesh, const int *node, const int *place, const double *volume,
                          const double *edge) {
-    static const int pair[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}};
+    double most = 0.0;
     int filled = 0;
-    for (int k = 0; k <= w->n; k++)
-        w->row[k] = 0.0;
+    memset(w->row, 0, (size_t)(w->n + 1) * sizeof *w->row);
     for (int k = 0; k < w->n; k++) {
         const int i = node[k];
-        double sum = 0.0;
+        double around = 0.0, sum = 0.0;
         w->start[k] = filled;
         w->inverse[k] = volume[i] > 0.0 ? 1.0 / volume[i] : 1.0; // a node without a cell keeps what is asked of it
         for (int m = mesh->node_cell_start[i]; m < mesh->node_cell_start[i + 1]; m++) {
@@ -51,7 +80,7 @@ static void sweep_rows(silt_sweep *w, const silt_mesh *mesh, const int *node, co
                 a++;
             for (int b = 0; b < 4; b++)
                 if (b != a)
-                    w->row[place[cell[b]]] -= edge[6 * e + pair[a][b]] * w->inverse[k];
+                    w->row[place[cell[b]]] -= edge[6 * e + sweep_pair[a][b]] * w->inverse[k];
         }
         for (int m = mesh->neighbour_start[i]; m < mesh->neighbour_start[i + 1]; m++) {
             const int j = place[mesh->neighbour[m]];
@@ -60,30 +89,14 @@ static void sweep_rows(silt_sweep *w, const silt_mesh *mesh, const int *node, co
             w->index[filled] = j;
             w->weight[filled++] = w->row[j];
             sum += w->row[j];
+            around += fabs(w->row[j]);
             w->row[j] = 0.0;
         }
         w->row[w->n] = 0.0;
         w->diagonal[k] = sum;
+        most = silt_max(most, sum + around);
     }
     w->start[w->n] = filled;
-}
-
-// Slivers make rows that are many times what a good mesh has, about 5 t/M^(2/3), and ask for twice as many sweeps: such rows and their
-// columns are cut. @return the largest eigenvalue that the rows can have (Gershgorin)
-static double sweep_bound(silt_sweep *w, double t) {
-    double most = 0.0;
-    for (int k = 0; k < w->n; k++)
-        w->row[k] = silt_min(1.0, sweep_cap * t * cbrt(silt_square(w->inverse[k])) / silt_max(w->diagonal[k], 1e-300));
-    for (int k = 0; k < w->n; k++) {
-        double around = 0.0;
-        w->diagonal[k] = 0.0;
-        for (int j = w->start[k]; j < w->start[k + 1]; j++) {
-            w->weight[j] *= silt_min(w->row[k], w->row[w->index[j]]);
-            w->diagonal[k] += w->weight[j];
-            around += fabs(w->weight[j]);
-        }
-        most = silt_max(most, w->diagonal[k] + around);
-    }
     return most;
 }
 
@@ -111,8 +124,8 @@ static void sweep_polynomial(silt_sweep *w, double most) {
         w->fade[k] = 1.0 / (2.0 * w->shift - w->fade[k - 1]);
 }
 
-void silt_sweep_build(silt_sweep *w, const silt_mesh *mesh, int n, const int *node, const int *place, const double *volume,
-                      const double *edge, double t) {
+void silt_sweep_build(silt_sweep *w, const silt_mesh *mesh, int n, const int *node, const int *place, int n_near, const int *near,
+                      const double *volume, double t, double *edge) {
     int most = 0;
     for (int k = 0; k < n; k++)
         most += mesh->neighbour_start[node[k] + 1] - mesh->neighbour_start[node[k]];
@@ -125,8 +138,8 @@ void silt_sweep_build(silt_sweep *w, const silt_mesh *mesh, int n, const int *no
     SILT_RESERVE(w->weight, w->weight_capacity[1], most + 1);
     for (int k = 0; k < 2; k++)
         SILT_RESERVE(w->work[k], w->work_capacity[k], SWEEP_FIELDS * (n + 1));
-    sweep_rows(w, mesh, node, place, volume, edge);
-    sweep_polynomial(w, sweep_bound(w, t));
+    sweep_soften(w, mesh, n_near, near, place, volume, t, edge);
+    sweep_polynomial(w, sweep_rows(w, mesh, node, place, volume, edge));
 }
 
 // ---------------------------------------------------------------- fields

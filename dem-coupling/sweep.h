@@ -24,10 +24,10 @@ typedef struct silt_sweep {
 
 /** volume of a tetrahedron (three numbers a corner), and t K between its corners 0-1, 0-2, 0-3, 1-2, 1-3, 2-3 */
 double silt_sweep_cell(const double corner[12], double t, double edge[6]);
-/** The polynomial of n nodes: place per node of the mesh (n: none of them), volume (m3) too, edge (with t, m2) 6 per cell of those
- * around */
-void silt_sweep_build(silt_sweep *sweep, const silt_mesh *mesh, int n, const int *node, const int *place, const double *volume,
-                      const double *edge, double t);
+/** The polynomial of n nodes: place per node of the mesh (n: none of them), volume (m3) too, near: cells around, edge (with t, m2):
+ * 6 per cell, of slivers less afterwards */
+void silt_sweep_build(silt_sweep *sweep, const silt_mesh *mesh, int n, const int *node, const int *place, int n_near, const int *near,
+                      const double *volume, double t, double *edge);
 /** H^-1 applied in place to n_field fields, 4 or SWEEP_FIELDS, stored node by node */
 void silt_sweep_solve(const silt_sweep *sweep, int n_field, double *field);
 void silt_sweep_clear(silt_sweep *sweep);

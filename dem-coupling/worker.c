@@ -392,6 +392,7 @@ static void worker_load(void) {
     dem_shared *s = worker.shared;
     worker_atoms a = worker_look();
     const double *force = DEM_SECTION(s, const double, force), *torque = DEM_SECTION(s, const double, torque);
+    const double *shift = DEM_SECTION(s, const double, shift);
     const dem_body *body = DEM_SECTION(s, const dem_body, body);
     double **f = lammps_extract_fix(worker.lmp, "dragforce", 1, 2, 0, 0),
            **t = lammps_extract_fix(worker.lmp, "hdtorque", 1, 2, 0, 0);
@@ -411,6 +412,9 @@ static void worker_load(void) {
         int i = worker_find(worker.order[k]);
         if (i >= 0 && a.type[i] == DEM_TYPE_GRAIN)
             memcpy(f[i], &force[3 * k], (size_t)s->dim * sizeof(double));
+        // LIGGGHTS sees a way beyond its skin before the first forces, and looks for neighbours anew
+        for (int c = 0; c < s->dim && i >= 0 && a.type[i] == DEM_TYPE_GRAIN && k < s->n_shift; c++)
+            a.x[i][c] += shift[3 * k + c];
         for (int c = s->dim == 3 ? 0 : 2; c < 3 && i >= 0 && a.type[i] == DEM_TYPE_GRAIN && k < s->n_torque; c++)
             a.torque[i][c] += t[i][c] = torque[3 * k + c];
     }

@@ -81,6 +81,13 @@ static inline double silt_dot(int dim, const double *a, const double *b) {
         sum += a[d] * b[d];
     return sum;
 }
+/** Adds x to a sum that is carried on for ever; rest holds what rounding left out of it (Neumaier 1974), so that sum is right to its last bit. */
+static inline void silt_sum(double *sum, double *rest, double x) {
+    const double t = *sum + x;
+    *rest += fabs(*sum) >= fabs(x) ? (*sum - t) + x : (x - t) + *sum;
+    *sum = t + *rest;
+    *rest -= *sum - t;
+}
 static inline double silt_length(int dim, const double *a) { return sqrt(silt_dot(dim, a, a)); }
 
 #endif

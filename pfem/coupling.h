@@ -41,9 +41,13 @@ typedef struct silt_coupling_type {
     silt_status (*prepare)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, double dt,
                            const silt_drag **drag, silt_error *err);
     /** After the water's step, before nodes move: forces on grains from the accepted pressure and the velocity that the drag
-     * was solved with (nodes->v must be the fluid's w, that positions move with; their sum is then what the water felt),
+     * was solved with (nodes->v must be the fluid's w, and nodes->x its midpoint mesh; their sum is then what the water felt),
      * forces on bodies: force and torque in bodies()->body[] were set by the run. */
     void (*load)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, double dt);
+
+    /** After load: a step of the random walk of suspended grains, if the scene asks for it. viscosity: per cell of the water, Pa s,
+     * with its eddies; step: counts the steps of the run. Grains are where they go at the next start. */
+    void (*walk)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, const double *viscosity, double dt, int64_t step);
 
     /** of the last load and the last substeps */
     void (*exchanged)(const silt_coupling *coupling, silt_exchanged *exchanged);

@@ -359,7 +359,8 @@ struct silt_bed {
     int64_t revision;    // rises when cells change
     double solid_mass;   // kg/m, sum of mass
     double initial_mass; // kg/m
-    double pore_water;   // kg/m, released to the water since the start less taken up
+    double pore_water, pore_rest; // kg/m, released to the water since the start less taken up, and what rounding left out (silt_sum)
+    int n_first;         // nodes at the start: later ones are deposits
     double y_plus;       // of the first cell on the bed in the last step, the largest; 0: the law takes no gradient
     struct silt_bed_index *index; // owned, cells by node and by place (bed_mesh.h); every change keeps it up to date
 };
@@ -375,6 +376,7 @@ typedef struct silt_grain_state {
     const double *mass;      // kg per m of width that the parcel stands for
     const int *contacts;     // number of contacts of the last substep
     const uint8_t *on_bed;   // 1 when one of them is with the bed
+    const double *contact;   // 3 per grain, N per m of width, of contacts, mean of the last step; may be NULL
     const double *net_force; // N per m of width, magnitude, mean of the last step (with gravity and water)
 } silt_grain_state;
 
@@ -411,6 +413,7 @@ typedef struct silt_ledger {
     double seepage_volume; // m3, the same, cumulative
     double seepage_lost;   // m3, cumulative: came out of the bed where no water is to take it; part of outflow_mass
     double bed_mass, released_mass, deposited_mass, left_mass;      // sediment, cumulative, kg
+    double released_rest, deposited_rest;         // kg, what rounding left out of the two (silt_sum)
     double bed_shear, bed_work, bed_y_plus;       // Pa, J/m3, largest on the bed's surface; see bed.y_plus
     double initial_sediment;
     int grain_count;

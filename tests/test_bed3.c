@@ -477,7 +477,7 @@ static double rain(bench3 *b, uint64_t *seed, int n, double r, int count[3]) {
     double taken = 0;
     for (int k = 0; k < n; k++) {
         double x[3] = {silt_uniform(seed), 0.4 * silt_uniform(seed), 0};
-        const double level = silt_bed_level(&b->bed, x), before = volume_of(&b->bed), pores = b->bed.pore_water;
+        const double level = silt_bed_level(&b->bed, x), before = volume_of(&b->bed), pores = b->bed.pore_water, pores_rest = b->bed.pore_rest;
         if (!(level > 0))
             continue;
         x[2] = level + r;
@@ -488,7 +488,9 @@ static double rain(bench3 *b, uint64_t *seed, int n, double r, int count[3]) {
         taken += deposit.kind == DEPOSIT_REFUSED ? 0 : mass;
         NEAR(b->bed.solid_mass, initial + taken, 1e-12 * initial);
         NEAR(pores3(b) + b->bed.pore_water, water, 1e-12 * water);
-        NEAR(b->bed.pore_water, pores - deposit.pore_water, 0);
+        double sum = pores, rest = pores_rest;
+        silt_sum(&sum, &rest, -deposit.pore_water);
+        NEAR(b->bed.pore_water, sum, 0);
         NEAR(volume_of(&b->bed) - before, deposit.area, 1e-12);
         for (int c = 0; c < b->bed.n_cell; c++)
             assert_in_range(1000 * (1 - b->bed.mass[c] / 2650 / b->bed.area[c]), 199, 801);

@@ -14,7 +14,7 @@ static void drop_parcels(bench *b, int n, double lo, double hi, double r, double
     for (int k = 0; k < n; k++) {
         const double x = lo + (hi - lo) * silt_uniform(&seed);
         const double at[2] = {x, silt_bed_level(&b->bed, (double[]){x}) + r + 0.3 * b->scene.bed.size * silt_uniform(&seed)};
-        const double solid = b->bed.solid_mass, pores = b->bed.pore_water, area = bed_area(&b->bed);
+        const double solid = b->bed.solid_mass, pores = b->bed.pore_water, pores_rest = b->bed.pore_rest, area = bed_area(&b->bed);
         const int64_t revision = b->bed.revision;
         silt_deposit deposit = {0};
         count[silt_bed_deposit(&b->bed, &b->scene, at, r, mass, &deposit)]++;
@@ -22,7 +22,9 @@ static void drop_parcels(bench *b, int n, double lo, double hi, double r, double
             taken += mass;
         NEAR(b->bed.solid_mass - solid, deposit.kind == DEPOSIT_REFUSED ? 0 : mass, 1e-13 * initial);
         NEAR(b->bed.solid_mass, initial + taken, 1e-13 * initial);
-        NEAR(b->bed.pore_water, pores - deposit.pore_water, 0);
+        double sum = pores, rest = pores_rest;
+        silt_sum(&sum, &rest, -deposit.pore_water);
+        NEAR(b->bed.pore_water, sum, 0);
         NEAR(pore_water(b) + b->bed.pore_water, water, 1e-12 * water);
         NEAR(bed_area(&b->bed) - area, deposit.area, 1e-12);
         assert_true((b->bed.revision > revision) == (deposit.kind != DEPOSIT_REFUSED));

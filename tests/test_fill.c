@@ -1,4 +1,5 @@
 // regions full of grains: how many, how large, where; nothing overlaps; the same bits for the same seed
+#include "output.h"
 #include "scene_keys.h"
 
 #include <setjmp.h>
@@ -243,10 +244,55 @@ static void test_space(void **state) {
     free(scene.grains.filled);
 }
 
+// The heap by hand: eight grains on a line that falls by 1 in 2 and hang together, a heavier one and two light ones apart from them.
+static void test_heap(void **state) {
+    (void)state;
+    enum { N = 11 };
+    double x[3 * N] = {0}, v[3 * N] = {0}, radius[N], mass[N], spin[3 * N] = {0}, force[3 * N] = {0};
+    int64_t id[N];
+    for (int i = 0; i < N; i++) {
+        x[3 * i] = 0.15 + 0.3 * i;
+        x[3 * i + 1] = 2 - 0.15 * i;
+        radius[i] = 0.3354102 / 2;
+        mass[i] = 1;
+        id[i] = 2 * i + 1;
+        force[3 * i] = i;
+    }
+    x[24] = 5, x[27] = 6, x[30] = 6.3;
+    x[25] = x[28] = x[31] = 1;
+    mass[8] = 5;
+    const silt_grain_state grains = {.count = N, .id = id, .x = x, .v = v, .omega = spin, .radius = radius, .mass = mass, .contact = force};
+    silt_scene scene = {.dimension = 2};
+    const silt_view view = {.scene = &scene, .grains = &grains};
+    silt_heap heap = {0};
+    silt_heap_find(&heap, &view);
+    for (int i = 0; i < N; i++)
+        assert_int_equal(heap.in[i], i < 8);
+    const silt_gauge_def right = {.kind = GAUGE_GRAIN_FRONT, .from = {1}}, left = {.kind = GAUGE_GRAIN_FRONT, .from = {-1}};
+    const silt_gauge_def height = {.kind = GAUGE_GRAIN_HEIGHT, .from = {0.75}}, none = {.kind = GAUGE_GRAIN_HEIGHT, .from = {5}};
+    const silt_gauge_def slope = {.kind = GAUGE_GRAIN_SLOPE, .from = {0, 2.4}};
+    assert_true(fabs(silt_heap_gauge(&heap, &view, &right) - 2.25 - radius[0]) < 1e-12);
+    assert_true(fabs(silt_heap_gauge(&heap, &view, &left) - 0.15 + radius[0]) < 1e-12);
+    assert_true(fabs(silt_heap_gauge(&heap, &view, &height) - 1.7 - radius[0]) < 1e-12);
+    assert_true(isnan(silt_heap_gauge(&heap, &view, &none)));
+    // four columns of two grains, whose upper ones stand 0.6 apart and fall by 0.3
+    assert_true(fabs(silt_heap_gauge(&heap, &view, &slope) - 180 / M_PI * atan(0.5)) < 1e-9);
+    silt_heap_clear(&heap);
+
+    // one grain by its number; of one that is gone nothing
+    double value[3] = {NAN, NAN, NAN};
+    silt_grain_gauge(&view, &(silt_gauge_def){.kind = GAUGE_GRAIN_FORCE, .index = 4}, value);
+    assert_true(isnan(value[0]));
+    silt_grain_gauge(&view, &(silt_gauge_def){.kind = GAUGE_GRAIN_FORCE, .index = 7}, value);
+    assert_true(value[0] == 3);
+    silt_grain_gauge(&view, &(silt_gauge_def){.kind = GAUGE_GRAIN_PLACE, .index = 7}, value);
+    assert_true(value[0] == x[9] && value[1] == x[10]);
+}
+
 int main(void) {
     const struct CMUnitTest test[] = {cmocka_unit_test(test_forms), cmocka_unit_test(test_most), cmocka_unit_test(test_clear),
                                       cmocka_unit_test(test_sieve), cmocka_unit_test(test_seed), cmocka_unit_test(test_many),
-                                      cmocka_unit_test(test_space)};
+                                      cmocka_unit_test(test_space), cmocka_unit_test(test_heap)};
     snprintf(folder, sizeof folder, "/tmp/silt-fill-XXXXXX");
     if (!mkdtemp(folder))
         return 1;

@@ -102,7 +102,7 @@ static void test_added_mass_stokes(void **unused) {
             tank_hydrostatic(&t, 3, 9.81);
             for (int step = 1; step <= 1600; step++) {
                 OK(silt_exchange_prepare(&t.exchange, &t.nodes, &t.mesh, dt, &error));
-                silt_exchange_load(&t.exchange, t.nodes.v, t.nodes.p, dt);
+                silt_exchange_load(&t.exchange, t.nodes.v, t.nodes.p, dt, NULL);
                 g->v[1] += dt * (g->force[1] / g->mass - 9.81);
                 if (step % 100 == 0)
                     near(-g->v[1] / terminal, 1 - exp(-step * dt / tau), 0.002, "Stokes' sphere");
@@ -130,7 +130,7 @@ static void test_added_mass_of_water_that_accelerates(void **unused) {
             for (int i = 0; i < t.nodes.count; i++)
                 w[2 * i + 1] = t.nodes.v[2 * i + 1] + 0.55 * dt * a;
             e->drag.update(e->drag.self, w, t.nodes.p, dt);
-            silt_exchange_load(e, w, t.nodes.p, dt);
+            silt_exchange_load(e, w, t.nodes.p, dt, NULL);
             g->v[1] += dt * g->force[1] / g->mass;
             for (int i = 0; i < t.nodes.count; i++)
                 t.nodes.v[2 * i + 1] += dt * a;
@@ -159,7 +159,7 @@ static void test_added_mass_is_stable(void **unused) {
             for (int step = 0; step < 6; step++) {
                 const double before = g->v[0];
                 OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, dt, &error));
-                silt_exchange_load(e, t.nodes.v, t.nodes.p, dt);
+                silt_exchange_load(e, t.nodes.v, t.nodes.p, dt, NULL);
                 g->v[0] += dt * g->force[0] / g->mass;
                 near((1 - g->v[0]) * (1 + x) / 4, (1 - before) / 4, 1e-7 * (1 + x), "gap to the water's velocity");
                 assert_true(g->v[0] <= 1 + 1e-7);
@@ -184,7 +184,7 @@ static void test_viscous_force(void **unused) {
         t.nodes.v[2 * i] = 30 * silt_square(t.nodes.x[2 * i + 1]);
     // a step so short that the mesh does not move
     OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, 1e-9, &error));
-    silt_exchange_load(e, t.nodes.v, t.nodes.p, 1e-9);
+    silt_exchange_load(e, t.nodes.v, t.nodes.p, 1e-9, NULL);
     near(g->force[0] / (g->solid * 1e-3 * 60), 1, 1e-3, "viscous force");
     near(g->force[1] / (g->solid * 1e-3 * 60), 0, 1e-3, "viscous force across");
     tank_close(&t);
@@ -204,7 +204,7 @@ static void test_lift(void **unused) {
         for (int i = 0; i < t.nodes.count; i++)
             t.nodes.v[2 * i] = side * 20 * t.nodes.x[2 * i + 1];
         OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, 1e-9, &error));
-        silt_exchange_load(e, t.nodes.v, t.nodes.p, 1e-9);
+        silt_exchange_load(e, t.nodes.v, t.nodes.p, 1e-9, NULL);
         const double u = g->water[0] - g->v[0], size = 1.615 * 1e-6 * sqrt(1000 * 1e-3 * 20) * g->number;
         assert_true(fabs(u) > 0.7);
         near(g->force[1] / (size * fabs(u)), 1, 1e-6, "Saffman's lift towards the faster water");
@@ -220,7 +220,7 @@ static void test_lift(void **unused) {
                 // the mesh stands: only the grain's side is asked about
                 const double dt = x * g->mass / beta;
                 OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, dt, &error));
-                silt_exchange_load(e, t.nodes.v, t.nodes.p, dt);
+                silt_exchange_load(e, t.nodes.v, t.nodes.p, dt, NULL);
                 for (int k = 0; k < 2; k++)
                     g->v[k] += dt * g->force[k] / g->mass;
                 const double now = hypot(g->water[0] - g->v[0], g->water[1] - g->v[1]);
@@ -248,7 +248,7 @@ static void test_spin(void **unused) {
     const double dt = 1e-3 / rate;
     for (int step = 1; step <= 2000; step++) {
         OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, dt, &error));
-        silt_exchange_load(e, t.nodes.v, t.nodes.p, dt);
+        silt_exchange_load(e, t.nodes.v, t.nodes.p, dt, NULL);
         if (step == 1) // the torque itself, but for what the spin loses within the step
             near(g->torque[2] / (-M_PI * 1e-3 * d * d * d * g->number * 30), 1 / 1.001, 1e-9, "torque");
         g->spin[2] += dt * g->torque[2] / inertia;
@@ -267,7 +267,7 @@ static void test_spin(void **unused) {
         double before = 0;
         for (int k = 0; k < 10; k++) {
             OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, step, &error));
-            silt_exchange_load(e, t.nodes.v, t.nodes.p, step);
+            silt_exchange_load(e, t.nodes.v, t.nodes.p, step, NULL);
             g->spin[2] += step * g->torque[2] / (g->mass * g->gyration * g->gyration);
             near(4 - g->spin[2], (4 - before) / (1 + x), 1e-4, "spin in water that turns");
             assert_true(g->spin[2] <= 4 + 1e-4);
@@ -339,7 +339,7 @@ static void test_what_grains_gain_the_water_loses(void **unused) {
             e->force.def.spin = true;
             e->dt = NAN;
             e->drag.update(e->drag.self, w, p, dt);
-            silt_exchange_load(e, w, p, dt);
+            silt_exchange_load(e, w, p, dt, NULL);
             for (int k = 0; k < e->n_grain; k++) {
                 torque += e->grain[k].torque[2];
                 size += fabs(e->grain[k].torque[2]);
@@ -351,7 +351,7 @@ static void test_what_grains_gain_the_water_loses(void **unused) {
         // accepted without a further update
         for (int i = 0; i < 2 * n; i++)
             w[i] *= 1.1;
-        silt_exchange_load(e, w, p, dt);
+        silt_exchange_load(e, w, p, dt, NULL);
         double water[2] = {0}, grains[2] = {0}, size = 0;
         for (int k = 0; k < e->n_grain; k++)
             for (int d = 0; d < 2; d++) {
@@ -396,7 +396,7 @@ static void test_steps_of_the_water_close(void **unused) {
         OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, dt, &error));
         const silt_step now = {.scene = &scene, .walls = &walls, .mesh = &t.mesh, .drag = &e->drag, .nodes = &t.nodes, .dt = dt};
         OK(silt_fluid_step(&fluid, &now, &error));
-        silt_exchange_load(e, fluid.w, t.nodes.p, dt);
+        silt_exchange_load(e, fluid.w, t.nodes.p, dt, NULL);
         double size = 0, gained[2] = {0};
         for (int p = 0; p < e->n_grain; p++) {
             silt_exchange_grain *g = &e->grain[p];
@@ -415,6 +415,59 @@ static void test_steps_of_the_water_close(void **unused) {
     tank_close(&t);
 }
 
+// A block of water at rest and grains at 1 as heavy as the water, but small, spread as evenly as its masses: in a step of backward
+// Euler on both sides the relative velocity falls to 1/(1 + 2 dt/tau), whatever dt/tau is: neither overshoots, momentum stays.
+static void test_stiff_drag_on_both_sides(void **unused) {
+    (void)unused;
+    silt_scene scene = {.dimension = 2};
+    scene.fluid = (silt_fluid_def){.on = true, .density = 1000, /* the drag alone is stiff */ .viscosity = 0, .size = 0.01, .tolerance = 1e-9, .iterations = 40,
+                                   .volume_steps = 15, .theta = 1};
+    silt_walls walls = {0};
+    print_message("dt/tau      left     exact e^-2x   momentum open\n");
+    for (double x = 1e-3; x < 2e6; x *= 10) {
+        tank t;
+        silt_fluid fluid = {0};
+        tank_open(&t, 8, 0.01, 0.3);
+        silt_exchange *e = &t.exchange;
+        e->gravity[1] = 0;
+        e->force.def.theta = 1;
+        const double d = 1e-4, density = 1e10, mass = density * M_PI / 6 * d * d * d, tau = mass / (3 * M_PI * 1e-3 * d), dt = x * tau;
+        const double speed = 1e-3 * 0.01 / dt; // the mesh stands nearly still
+        double total = 0;
+        for (int i = 0; i < t.mesh.n_node; i++) {
+            // a grain at every node, which stands for as many as are as heavy as its water
+            SILT_RESERVE(e->grain, e->grain_capacity, e->n_grain + 1);
+            silt_exchange_grain *g = &e->grain[e->n_grain++];
+            double water = 0;
+            for (int k = t.mesh.node_cell_start[i]; k < t.mesh.node_cell_start[i + 1]; k++)
+                water += 1000 * silt_cell_area(t.nodes.x, t.mesh.cell[t.mesh.node_cell[k]]) / 3;
+            *g = (silt_exchange_grain){.x = {t.nodes.x[2 * i], t.nodes.x[2 * i + 1]}, .v = {speed, 0}, .diameter = d, .number = water / mass,
+                                       .solid = water / density, .mass = water, .cell = t.mesh.node_cell[t.mesh.node_cell_start[i]]};
+            for (int a = 0; a < 3; a++)
+                g->weight[a] = t.mesh.cell[g->cell][a] == i;
+            total += water * speed;
+        }
+        OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, dt, &error));
+        const silt_step now = {.scene = &scene, .walls = &walls, .mesh = &t.mesh, .drag = &e->drag, .nodes = &t.nodes, .dt = dt};
+        OK(silt_fluid_step(&fluid, &now, &error));
+        silt_exchange_load(e, fluid.w, t.nodes.p, dt);
+        double momentum = 0, worst = 0, left = 0;
+        for (int i = 0; i < t.mesh.n_node; i++) {
+            const silt_exchange_grain *g = &e->grain[i];
+            const double v = g->v[0] + dt * g->force[0] / g->mass, u = t.nodes.v[2 * i], gap = (v - u) / speed;
+            momentum += g->mass * v + fluid.mass[i] * u;
+            worst = silt_max(worst, fabs(gap - 1 / (1 + 2 * x)));
+            left = silt_max(left, gap);
+            assert_true(gap >= -1e-9 && v <= speed * (1 + 1e-9) && u >= -1e-9 * speed);
+        }
+        print_message("%-9.0e %.3e  %.3e     %.0e\n", x, left, exp(-2 * x), fabs(momentum / total - 1));
+        near(worst, 0, 1e-6, "relative velocity after a step");
+        near(momentum / total, 1, 1e-9, "momentum of grains and water");
+        silt_fluid_clear(&fluid);
+        tank_close(&t);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_added_mass_stokes),
@@ -425,6 +478,7 @@ int main(void) {
         cmocka_unit_test(test_spin),
         cmocka_unit_test(test_what_grains_gain_the_water_loses),
         cmocka_unit_test(test_steps_of_the_water_close),
+        cmocka_unit_test(test_stiff_drag_on_both_sides),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -291,10 +291,196 @@ static void test_sinking(void **state) {
             }
 }
 
+// ---------------------------------------------------------------- slopes that fall
+
+// steepest ground that is left of a bed whose angle of repose is 32 degrees, degrees; *fell: share of its mass that fell
+static double fallen(int n, const double *outline, double *fell, int *rounds) {
+    bench b;
+    bench_open(&b, 0.02);
+    bench_sand(&b, BED_EXCESS_SHEAR, 1e-3);
+    b.scene.bed.repose = 32;
+    bench_polygon(&b, n, outline);
+    bench_wall(&b, 4, (double[]){-1, 1, -1, 0, 2, 0, 2, 1});
+    bench_create(&b);
+    const double initial = b.bed.solid_mass;
+    double left = 0;
+    int node[64];
+    *rounds = 0;
+    for (int k; (k = silt_bed_steep(&b.bed, &b.scene, 64, node)) > 0 && *rounds < 500; ++*rounds)
+        for (int q = 0; q < k; q++) {
+            silt_patch patch;
+            silt_bed_patch(&b.bed, node[q], &patch);
+            if (patch.n_cell && b.bed.exposed[node[q]]) {
+                left += patch.mass;
+                silt_bed_release(&b.bed, &b.scene, &patch);
+            }
+        }
+    check_bed(&b);
+    NEAR(b.bed.solid_mass + left, initial, 1e-12 * initial);
+    // the steepest straight line between points of the surface five cells apart
+    double steepest = 0;
+    for (double x = -0.9; x < 1.8; x += 0.01) {
+        const double low = silt_bed_level(&b.bed, (double[2]){x, 0}), high = silt_bed_level(&b.bed, (double[2]){x + 0.1, 0});
+        if (isfinite(low) && isfinite(high))
+            steepest = silt_max(steepest, fabs(high - low) / 0.1);
+    }
+    *fell = left / initial;
+    bench_close(&b);
+    return atan(steepest) * 180 / M_PI;
+}
+
+static void test_repose(void **state) {
+    (void)state;
+    double fell;
+    int rounds;
+    // 28 degrees stand, 60 fall to about 32
+    NEAR(fallen(4, (double[]){0, 0, 0.3, 0.1595, 0.7, 0.1595, 1, 0}, &fell, &rounds), 28, 0.5);
+    assert_true(fell == 0 && rounds == 0);
+    const double steepest = fallen(4, (double[]){0, 0, 0.1155, 0.2, 0.8845, 0.2, 1, 0}, &fell, &rounds);
+    print_message("60 degrees fell to %.1f in %d rounds, %.1f %% of the mass\n", steepest, rounds, 100 * fell);
+    // the slope under 32 degrees from the toes takes 23 % away
+    assert_true(steepest < 36 && fabs(fell - 0.23) < 0.03);
+}
+
+// ---------------------------------------------------------------- grains of a patch
+
+static void test_sieve(void **state) {
+    (void)state;
+    // half of the mass between 1 and 2 mm, half between 2 and 4 mm; patches as heavy as a grain of 9 mm
+    double row[6] = {0.001, 0, 0.002, 0.5, 0.004, 1}, share[256], finer[4] = {0}, whole = 0;
+    const silt_series sieve = {.n_row = 3, .n_column = 2, .value = row};
+    int most = 0;
+    for (int patch = 0; patch < 1000; patch++) {
+        const uint64_t seed = silt_hash(0, &patch, sizeof patch);
+        const int n = silt_sieve_draw(&sieve, seed, 0.009, 3, 256, share);
+        most = n > most ? n : most;
+        double sum = 0, again[256];
+        assert_int_equal(silt_sieve_draw(&sieve, seed, 0.009, 3, 256, again), n);
+        assert_memory_equal(again, share, (size_t)n * sizeof *share);
+        for (int k = 0; k < n; k++) {
+            const double d = 0.009 * cbrt(share[k]);
+            sum += share[k];
+            for (int q = 0; q < 4; q++)
+                finer[q] += d < (q + 1) * 0.001 * (q == 3 ? 0.999 : 1) || q == 3 ? share[k] : 0;
+        }
+        NEAR(sum, 1, 1e-14);
+        whole += sum;
+    }
+    // scaling to the exact mass shifts the sizes a little
+    NEAR(finer[0] / whole, 0, 0.02);
+    NEAR(finer[1] / whole, 0.5, 0.02);
+    NEAR(finer[2] / whole, 0.75, 0.02);
+    print_message("passing 2 and 3 mm: %.3f and %.3f of the mass, at most %d grains\n", finer[1] / whole, finer[2] / whole, most);
+    assert_in_range(most, 100, 255);
+}
+
+// ---------------------------------------------------------------- what was deposited
+
+static void test_deposited(void **state) {
+    (void)state;
+    bench b;
+    bench_open(&b, 0.05);
+    bench_sand(&b, BED_FRICTIONAL_WORK, 1e-3);
+    b.scene.bed.shear = SHEAR_GRADIENT;
+    b.scene.bed.work = 100;
+    b.scene.bed.deposit_work = 10;
+    bench_stream(&b, 0, 100);
+    assert_int_equal(b.bed.n_first, b.bed.n_node);
+    // a parcel that leaves a cell looser than the bed: its new node has the deposit's work
+    silt_deposit deposit;
+    const double mass = 0.4 * 2650 * 0.05 * 0.03 / 2, whole = b.bed.solid_mass;
+    assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[]){0.275, 0.13, 0}, 0.02, mass, &deposit), DEPOSIT_CELL);
+    assert_true(deposit.node >= b.bed.n_first);
+    for (int i = 0; i < b.bed.n_node; i++)
+        NEAR(silt_bed_work(&b.bed, &b.scene, i), i == deposit.node ? 10 : 100, 0);
+    int due[8];
+    b.bed.work[deposit.node] = 10;
+    assert_int_equal(silt_bed_due(&b.bed, &b.scene, 8, due), 1);
+    assert_int_equal(due[0], deposit.node);
+    // the paper's rule: another one goes into that cell's pores as long as it is looser than the bed, then no more
+    const double loose = 2650 * 0.6 * b.bed.area[deposit.cell[0]] - b.bed.mass[deposit.cell[0]];
+    assert_true(loose > 0);
+    silt_deposit more;
+    assert_int_equal(silt_bed_densify(&b.bed, &b.scene, (double[]){0.275, 0.15, 0}, 0.04, 0.4, 1.01 * loose, &more), DEPOSIT_REFUSED);
+    assert_int_equal(silt_bed_densify(&b.bed, &b.scene, (double[]){0.275, 0.15, 0}, 0.04, 0.4, loose, &more), DEPOSIT_DENSER);
+    NEAR(more.pore_water, -loose / 2650 * 1000, 1e-12);
+    assert_int_equal(silt_bed_densify(&b.bed, &b.scene, (double[]){0.275, 0.15, 0}, 0.04, 0.4, 0.01 * loose, &more), DEPOSIT_REFUSED);
+    NEAR(b.bed.solid_mass, whole + mass + loose, 1e-12 * whole);
+    // the stress that keeps it from being bed is that of the nearest node
+    b.bed.shear[deposit.node] = 0.7;
+    NEAR(silt_bed_shear_at(&b.bed, (double[]){0.275, 0.16, 0}), 0.7, 0);
+    bench_close(&b);
+}
+
+// ---------------------------------------------------------------- the ledger
+
+// 10000 releases and deposits: the mass of bed, grains and what left, and the water of pores and flow, close to the last bits
+static void test_ledger(void **state) {
+    (void)state;
+    bench b;
+    bench_open(&b, 0.05);
+    bench_sand(&b, BED_EXCESS_SHEAR, 1e-3);
+    bench_box(&b, 0, 0, 1, 0.3);
+    bench_wall(&b, 4, (double[]){0, 2, 0, 0, 1, 0, 1, 2});
+    b.scene.bed.saturation = 0.7;
+    bench_create(&b);
+    enum { GRAINS = 4000 };
+    double *grain = silt_alloc(GRAINS, sizeof *grain), left = 0, left_rest = 0;
+    double released = 0, released_rest = 0, deposited = 0, deposited_rest = 0;
+    const double initial = b.bed.solid_mass, pores = pore_water(&b);
+    uint64_t random = 11;
+    int n = 0, n_release = 0, n_deposit = 0, n_left = 0;
+    for (int event = 0; n_release < 5000 || n_deposit < 5000; event++) {
+        assert_true(event < 100000);
+        if (b.bed.solid_mass > 0.5 * initial && n + 3 < GRAINS) {
+            // any node of the surface, in three parcels
+            int node = (int)(silt_random(&random) % (uint64_t)b.bed.n_node);
+            while (!b.bed.exposed[node])
+                node = (node + 1) % b.bed.n_node;
+            silt_patch patch;
+            silt_bed_patch(&b.bed, node, &patch);
+            silt_bed_release(&b.bed, &b.scene, &patch);
+            silt_sum(&released, &released_rest, patch.mass);
+            grain[n] = grain[n + 1] = patch.mass / 3;
+            grain[n + 2] = patch.mass - grain[n] - grain[n + 1];
+            n += 3;
+            n_release++;
+        }
+        // grains somewhere on the surface; few leave for ever
+        for (int k = 0; k < 4 && n > 0 && b.bed.n_edge > 0; k++) {
+            const int *edge = b.bed.edge[silt_random(&random) % (uint64_t)b.bed.n_edge];
+            double x[3] = {0}, out[3] = {0};
+            silt_bed_facet_normal(&b.bed, edge, out);
+            for (int d = 0; d < 2; d++)
+                x[d] = 0.5 * (b.bed.x[edge[0]][d] + b.bed.x[edge[1]][d]) + 0.03 * out[d] / hypot(out[0], out[1]);
+            silt_deposit deposit;
+            if (silt_bed_deposit(&b.bed, &b.scene, x, 0.03, grain[n - 1], &deposit) != DEPOSIT_REFUSED) {
+                silt_sum(&deposited, &deposited_rest, grain[--n]);
+                n_deposit++;
+            } else if (silt_random(&random) % 200 == 0) {
+                silt_sum(&left, &left_rest, grain[--n]);
+                n_left++;
+            }
+        }
+        double sum = b.bed.solid_mass, rest = 0;
+        for (int k = 0; k < n; k++)
+            silt_sum(&sum, &rest, grain[k]);
+        silt_sum(&sum, &rest, left);
+        NEAR(sum, initial, 1e-13 * initial);
+        NEAR(b.bed.solid_mass, initial - released + deposited, 1e-13 * initial);
+        NEAR(b.bed.pore_water + pore_water(&b), pores, 1e-12 * pores);
+    }
+    print_message("%d releases, %d deposits, %d left\n", n_release, n_deposit, n_left);
+    assert_true(n_left > 10);
+    free(grain);
+    bench_close(&b);
+}
+
 int main(void) {
     const struct CMUnitTest test[] = {
         cmocka_unit_test(test_shields), cmocka_unit_test(test_slope),    cmocka_unit_test(test_rate),    cmocka_unit_test(test_log_law),
         cmocka_unit_test(test_gradient), cmocka_unit_test(test_cover), cmocka_unit_test(test_cover_parcels), cmocka_unit_test(test_sinking),
+        cmocka_unit_test(test_repose),   cmocka_unit_test(test_sieve),   cmocka_unit_test(test_deposited), cmocka_unit_test(test_ledger),
     };
     return cmocka_run_group_tests(test, NULL, NULL);
 }

@@ -232,6 +232,7 @@ static void test_water_and_grain_together(void **unused) {
         OK(silt_fluid_step(&run.fluid, &now, &error));
         silt_nodes moving = run.nodes;
         moving.v = run.fluid.w;
+        moving.x = run.fluid.x_mid;
         silt_coupling_dem.load(run.coupling, &moving, &run.mesh, run.dt);
         OK(silt_coupling_dem.start(run.coupling, n_sub, &error));
         OK(silt_coupling_dem.finish(run.coupling, &error));

@@ -59,7 +59,8 @@ void silt_bed_release(silt_bed *bed, const silt_scene *scene, const silt_patch *
                 silt_bed_edge_add(bed, scene, turned);
         }
     silt_bed_refresh(bed);
-    bed->pore_water += scene->bed.saturation * (patch->area - patch->mass / scene->bed.density) * scene->fluid.density;
+    silt_sum(&bed->pore_water, &bed->pore_rest,
+             scene->bed.saturation * (patch->area - patch->mass / scene->bed.density) * scene->fluid.density);
     silt_bed_heirs_give(&heirs, bed);
 }
 

@@ -251,7 +251,7 @@ silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const
     if (deposit->n_cell > 0) {
         deposit->kind = DEPOSIT_CELL;
         deposit->pore_water = scene->bed.saturation * (deposit->area - mass / scene->bed.density) * scene->fluid.density;
-        bed->pore_water -= deposit->pore_water;
+        silt_sum(&bed->pore_water, &bed->pore_rest, -deposit->pore_water);
         return deposit->kind;
     }
 
@@ -263,6 +263,6 @@ silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const
     silt_bed_refresh(bed);
     deposit->kind = DEPOSIT_DENSER;
     deposit->pore_water = -scene->bed.saturation * mass / scene->bed.density * scene->fluid.density;
-    bed->pore_water -= deposit->pore_water;
+    silt_sum(&bed->pore_water, &bed->pore_rest, -deposit->pore_water);
     return deposit->kind;
 }

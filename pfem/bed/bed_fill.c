@@ -323,5 +323,6 @@ silt_status silt_bed_create(silt_bed *bed, const silt_scene *scene, const silt_w
     }
     silt_bed_refresh(bed);
     bed->initial_mass = bed->solid_mass;
+    bed->n_first = bed->n_node;
     return SILT_OK;
 }

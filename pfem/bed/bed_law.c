@@ -31,7 +31,8 @@ void silt_bed_heirs_take(silt_bed_heirs *heirs, const silt_bed *bed, const silt_
     if (!(length > 0))
         return;
     heirs->work_length = length;
-    heirs->work = length * silt_clamp(bed->work[patch->node] - scene->bed.work, 0, scene->bed.work);
+    const double full = silt_bed_work(bed, scene, patch->node);
+    heirs->work = length * silt_clamp(bed->work[patch->node] - full, 0, full);
     // what its neighbours took out of the patch it has worn off as well: up to two patches
     heirs->eroded = silt_clamp(length * bed->eroded[patch->node] - patch->mass, 0, 2 * patch->mass);
 }
@@ -342,9 +343,11 @@ void silt_bed_wear(silt_bed *bed, const silt_scene *scene, const silt_nodes *nod
             bed->work[k] += work;
             // rho_s (1 - n) h_0 dW / W_c; without a layer h_0 is the patch's height and what counts is the work
             if (isfinite(def->work))
-                bed->eroded[k] += def->layer > 0 ? plan * solid * def->layer * work / def->work : solid * patch.height * work / def->work;
-        } else
-            bed->eroded[k] += plan * open * solid * silt_bed_rate(scene, stress.tau, threshold, level) * dt;
+                bed->eroded[k] += solid * (def->layer > 0 ? plan * def->layer : patch.height) * work / silt_bed_work(bed, scene, k);
+        } else {
+            const double weaker = def->law == BED_POWER ? def->work / silt_bed_work(bed, scene, k) : 1;
+            bed->eroded[k] += weaker * plan * open * solid * silt_bed_rate(scene, stress.tau, threshold, level) * dt;
+        }
     }
     free(ground);
 }
@@ -353,7 +356,7 @@ void silt_bed_wear(silt_bed *bed, const silt_scene *scene, const silt_nodes *nod
 static double wear_share(const silt_bed *bed, const silt_scene *scene, int node) {
     const silt_bed_def *def = &scene->bed;
     if ((def->law == BED_FRICTIONAL_WORK || def->law == BED_DISSIPATION) && def->layer <= 0)
-        return bed->work[node] / def->work;
+        return bed->work[node] / silt_bed_work(bed, scene, node);
     silt_patch patch;
     silt_bed_patch(bed, node, &patch);
     return bed->eroded[node] / patch_full(bed, &patch);
@@ -382,4 +385,74 @@ int silt_bed_due(const silt_bed *bed, const silt_scene *scene, int capacity, int
         n += n < capacity;
     }
     return n;
+}
+
+// ---------------------------------------------------------------- what deposition asks
+
+double silt_bed_shear_at(const silt_bed *bed, const double *x) {
+    const int dim = bed->dim == 3 ? 3 : 2;
+    double nearest = HUGE_VAL, shear = 0;
+    for (int k = 0; k < bed->n_node; k++) {
+        double way = 0;
+        for (int d = 0; d < dim && bed->exposed[k]; d++)
+            way += silt_square(bed->x[k][d] - x[d]);
+        if (bed->exposed[k] && way < nearest) {
+            nearest = way;
+            shear = bed->shear[k];
+        }
+    }
+    return shear;
+}
+
+typedef struct bed_room {
+    int cell;
+    double way, room; // m to its centre, kg/m that it still takes
+} bed_room;
+
+static int room_compare(const void *a, const void *b) {
+    const bed_room *p = a, *q = b;
+    return p->way != q->way ? (p->way > q->way) - (p->way < q->way) : (p->cell > q->cell) - (p->cell < q->cell);
+}
+
+// cells with pores to spare within reach of x, the nearest first; @return kg/m that they take
+static double room_list(const silt_bed *bed, const silt_scene *scene, const double *x, double reach, double porosity, int *n, bed_room *list) {
+    const int dim = bed->dim == 3 ? 3 : 2;
+    double sum = 0;
+    *n = 0;
+    for (int c = 0; c < bed->n_cell; c++) {
+        double centre[3] = {0}, way = 0;
+        for (int a = 0; a <= dim; a++)
+            for (int d = 0; d < dim; d++)
+                centre[d] += bed->x[bed->cell[c][a]][d] / (dim + 1);
+        for (int d = 0; d < dim; d++)
+            way += silt_square(centre[d] - x[d]);
+        const double room = scene->bed.density * (1 - porosity) * bed->area[c] - bed->mass[c];
+        if (way > reach * reach || room <= 1e-9 * bed->mass[c])
+            continue;
+        list[(*n)++] = (bed_room){c, sqrt(way), room};
+        sum += room;
+    }
+    qsort(list, (size_t)*n, sizeof *list, room_compare);
+    return sum;
+}
+
+silt_deposit_kind silt_bed_densify(silt_bed *bed, const silt_scene *scene, const double *x, double reach, double porosity, double mass,
+                                   silt_deposit *deposit) {
+    *deposit = (silt_deposit){.kind = DEPOSIT_REFUSED, .node = -1};
+    bed_room *list = silt_alloc((size_t)bed->n_cell + 1, sizeof *list);
+    int n;
+    if (mass > 0 && room_list(bed, scene, x, reach, porosity, &n, list) >= mass) {
+        double left = mass;
+        for (int k = 0; k < n && left > 0; k++) {
+            const double part = silt_min(left, list[k].room);
+            bed->mass[list[k].cell] += part;
+            left -= part;
+        }
+        silt_bed_refresh(bed);
+        deposit->kind = DEPOSIT_DENSER;
+        deposit->pore_water = -scene->bed.saturation * mass / scene->bed.density * scene->fluid.density;
+        silt_sum(&bed->pore_water, &bed->pore_rest, -deposit->pore_water);
+    }
+    free(list);
+    return deposit->kind;
 }

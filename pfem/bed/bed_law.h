@@ -28,6 +28,10 @@ double silt_bed_rate(const silt_scene *scene, double tau, double threshold, doub
 
 // ---------------------------------------------------------------- on the bed
 
+/** J/m3, W_c of a node: that of the bed, or of what was deposited */
+static inline double silt_bed_work(const silt_bed *bed, const silt_scene *scene, int node) {
+    return node >= bed->n_first && scene->bed.deposit_work > 0 ? scene->bed.deposit_work : scene->bed.work;
+}
 /** Adds a step's frictional work and the mass per area worn off at the exposed nodes (law, shear and threshold of the scene), and
  * refreshes bed->shear and bed->y_plus.
  * @param cover  one per node, share of its surface that parcels lie on, which does not wear; NULL: none */
@@ -40,6 +44,16 @@ void silt_bed_cover(const silt_bed *bed, const silt_scene *scene, const silt_gra
  * patch. Ask once a step: what that step's releases expose comes in the next. @return how many (at most capacity) */
 int silt_bed_due(const silt_bed *bed, const silt_scene *scene, int capacity, int *due);
 
+/** Exposed nodes that fall (bed_slope.c): they stand higher than the angle of repose allows over a node within eight along the surface,
+ * by more than the step that a single release cuts; of neighbours the highest over what is allowed, so that slopes give way from the
+ * top, a row in a step. @return how many */
+int silt_bed_steep(const silt_bed *bed, const silt_scene *scene, int capacity, int *node);
+/** Pa, shear stress of the last step on the exposed node nearest to x (dim numbers); 0 without any */
+double silt_bed_shear_at(const silt_bed *bed, const double *x);
+/** Puts a parcel's solid mass into the pores of cells whose centres are within reach of x, the nearest first, down to a porosity: all of
+ * it or nothing. @return in deposit->kind: DEPOSIT_DENSER or DEPOSIT_REFUSED */
+silt_deposit_kind silt_bed_densify(silt_bed *bed, const silt_scene *scene, const double *x, double reach, double porosity, double mass,
+                                   silt_deposit *deposit);
 /** The nodes around a patch that is about to leave, and what its node has worn off beyond it */
 typedef struct silt_bed_heirs {
     int count, node_capacity, length_capacity;

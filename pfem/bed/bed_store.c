@@ -11,7 +11,7 @@ typedef struct bed_array {
 
 enum { PER_NODE, PER_CELL, PER_EDGE, PER_BED, N_ARRAY = 15 };
 
-static void bed_arrays(silt_bed *bed, double sum[3], bed_array array[N_ARRAY]) {
+static void bed_arrays(silt_bed *bed, double sum[5], bed_array array[N_ARRAY]) {
     const bed_array all[N_ARRAY] = {
         {"bed/x", STORE_DOUBLE, PER_NODE, 3, bed->x},
         {"bed/alive", STORE_BYTE, PER_NODE, 1, bed->alive},
@@ -27,14 +27,14 @@ static void bed_arrays(silt_bed *bed, double sum[3], bed_array array[N_ARRAY]) {
         {"bed/area", STORE_DOUBLE, PER_CELL, 1, bed->area},
         {"bed/edge", STORE_INT, PER_EDGE, 3, bed->edge},
         {"bed/revision", STORE_LONG, PER_BED, 1, &bed->revision},
-        {"bed/sum", STORE_DOUBLE, PER_BED, 3, sum},
+        {"bed/sum", STORE_DOUBLE, PER_BED, 5, sum},
     };
     memcpy(array, all, sizeof all);
 }
 
 silt_status silt_bed_save(const silt_bed *bed, silt_store *store, silt_error *err) {
     silt_bed borrowed = *bed;
-    double sum[3] = {bed->solid_mass, bed->initial_mass, bed->pore_water};
+    double sum[5] = {bed->solid_mass, bed->initial_mass, bed->pore_water, bed->pore_rest, bed->n_first};
     bed_array array[N_ARRAY];
     bed_arrays(&borrowed, sum, array);
     const int64_t count[5] = {bed->n_node, bed->n_cell, bed->n_edge, 1, bed_dim(bed)};
@@ -65,7 +65,7 @@ silt_status silt_bed_load(silt_bed *bed, const silt_walls *walls, silt_store *st
     silt_bed_reserve_cells(bed, bed->n_cell);
     SILT_RESERVE(bed->edge, bed->edge_capacity, bed->n_edge);
 
-    double sum[3] = {0};
+    double sum[5] = {0};
     bed_array array[N_ARRAY];
     bed_arrays(bed, sum, array);
     silt_status status = SILT_OK;
@@ -102,5 +102,7 @@ silt_status silt_bed_load(silt_bed *bed, const silt_walls *walls, silt_store *st
     bed->solid_mass = sum[0];
     bed->initial_mass = sum[1];
     bed->pore_water = sum[2];
+    bed->pore_rest = sum[3];
+    bed->n_first = (int)sum[4];
     return SILT_OK;
 }

@@ -45,7 +45,7 @@ static double shape(int D, const double *x, double g[4][3]) {
 
 void silt_seep_clear(silt_seep *seep) {
     double *owned[] = {seep->pressure, seep->lag, seep->gradient, seep->darcy, seep->mobility, seep->value, seep->load,
-                       seep->solution, seep->right, seep->into, seep->work};
+                       seep->solution, seep->right, seep->into, seep->work, seep->basis};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
     free(seep->face);
@@ -246,9 +246,18 @@ static double into_node(const silt_seep *seep, int k, bool loaded) {
 
 // ---------------------------------------------------------------- which nodes are what
 
-static bool under_water(const silt_bed *bed, const silt_mesh *mesh, int k) {
+// Under water: with a node of the water's inside beside it. Drops and films have pressures that mean nothing, or none: what they stand
+// on counts as dry.
+static bool under_water(const silt_bed *bed, const silt_nodes *nodes, const silt_mesh *mesh, int k) {
     const int i = bed->fluid_node[k];
-    return bed->alive[k] && bed->exposed[k] && i >= 0 && i < mesh->n_node && mesh->wet[i];
+    if (!bed->alive[k] || !bed->exposed[k] || i < 0 || i >= mesh->n_node || !mesh->wet[i])
+        return false;
+    for (int m = mesh->neighbour_start[i]; m < mesh->neighbour_start[i + 1]; m++) {
+        const int j = mesh->neighbour[m];
+        if (!mesh->surface[j] && nodes->kind[j] != NODE_BED && nodes->kind[j] != NODE_BODY)
+            return true;
+    }
+    return false;
 }
 
 // A piece of bed that nothing holds the pressure of: its level is that of its lowest node on the surface, or of any
@@ -312,12 +321,12 @@ static int face_foot(const silt_seep *seep, const silt_bed *bed, const double g[
 }
 
 // @return whether any node is another kind than before
-static bool classify(silt_seep *seep, const silt_bed *bed, const silt_mesh *mesh, const double g[3]) {
+static bool classify(silt_seep *seep, const silt_bed *bed, const silt_nodes *nodes, const silt_mesh *mesh, const double g[3]) {
     int *before = silt_alloc((size_t)bed->n_node + 1, sizeof *before);
     memcpy(before, seep->kind, (size_t)bed->n_node * sizeof *before);
     seep->n_water = 0;
     for (int k = 0; k < bed->n_node; k++) {
-        seep->water[k] = under_water(bed, mesh, k) ? bed->fluid_node[k] : -1;
+        seep->water[k] = under_water(bed, nodes, mesh, k) ? bed->fluid_node[k] : -1;
         const bool dry = bed->exposed[k] && bed->fluid_node[k] >= 0;
         seep->kind[k] = !bed->alive[k] ? SEEP_NONE : seep->water[k] >= 0 ? SEEP_WATER : dry && seep->face[k] ? SEEP_FACE : SEEP_INSIDE;
         seep->n_water += seep->kind[k] == SEEP_WATER;
@@ -370,7 +379,7 @@ silt_status silt_seep_prepare(silt_seep *seep, silt_bed *bed, const silt_scene *
         rows_make(seep, bed);
     bool stale = fresh;
     for (int pass = 0;; pass++) {
-        if (classify(seep, bed, mesh, scene->gravity) || stale) {
+        if (classify(seep, bed, nodes, mesh, scene->gravity) || stale) {
             matrix_make(seep, bed, scene);
             SILT_TRY(matrix_factor(seep, bed, err));
         }
@@ -388,31 +397,32 @@ silt_status silt_seep_prepare(silt_seep *seep, silt_bed *bed, const silt_scene *
 
 // ---------------------------------------------------------------- what the water sees
 
+// out += what goes into the bed from the water's nodes, with their pressure in solution; what comes out of a face reaches its foot
+static void hand_over(silt_seep *seep, bool loaded, double *out) {
+    solve_inside(seep, loaded);
+    for (int k = 0; k < seep->n_node; k++) {
+        const int to = seep->kind[k] == SEEP_WATER ? k : seep->kind[k] == SEEP_FACE ? seep->foot[k] : -1;
+        if (to >= 0)
+            out[seep->water[to]] += into_node(seep, k, loaded);
+    }
+}
+
 void silt_seep_take(silt_seep *seep, const double *p, double *taken) {
     for (int k = 0; k < seep->n_node; k++)
         seep->solution[k] = seep->kind[k] == SEEP_WATER ? p[seep->water[k]] : 0;
-    solve_inside(seep, true);
-    for (int k = 0; k < seep->n_node; k++) {
-        if (seep->kind[k] == SEEP_WATER)
-            taken[seep->water[k]] += into_node(seep, k, true);
-        else if (seep->kind[k] == SEEP_FACE && seep->foot[k] >= 0)
-            taken[seep->water[seep->foot[k]]] += into_node(seep, k, true);
-    }
+    hand_over(seep, true, taken);
 }
 
 void silt_seep_apply(silt_seep *seep, const double *x, double *out) {
     for (int k = 0; k < seep->n_node; k++)
         seep->solution[k] = seep->kind[k] == SEEP_WATER ? x[seep->water[k]] : 0;
-    solve_inside(seep, false);
-    for (int k = 0; k < seep->n_node; k++)
-        if (seep->kind[k] == SEEP_WATER)
-            out[seep->water[k]] += into_node(seep, k, false);
+    hand_over(seep, false, out);
 }
 
 // ---------------------------------------------------------------- results
 
 // Darcy's velocity of the cells, and per node the upward force of the seepage on the grains over their weight under water
-static void results_make(silt_seep *seep, const silt_bed *bed, const silt_scene *scene) {
+void silt_seep_results(silt_seep *seep, const silt_bed *bed, const silt_scene *scene) {
     const int D = seep_dim(bed);
     const double rho = scene->fluid.density, size = silt_length(3, scene->gravity);
     double *weight = seep->right;
@@ -452,7 +462,7 @@ void silt_seep_accept(silt_seep *seep, silt_bed *bed, const silt_scene *scene, c
         if (seep->kind[k] == SEEP_FACE && seep->foot[k] < 0)
             seep->lost -= into;
     }
-    results_make(seep, bed, scene);
+    silt_seep_results(seep, bed, scene);
 }
 
 bool silt_seep_pressure_at(const silt_bed *bed, const double *x, double *pressure) {

@@ -41,8 +41,8 @@ typedef struct silt_seep {
     silt_factor factor;  // owned, A for the nodes inside, 1 for the others
     double *solution, *right, *into; // owned, per node, working space
     int node_capacity, cell_capacity, face_capacity, row_capacity;
-    double *work;        // owned, conjugate gradients of the water (seepage.c)
-    int work_capacity;
+    double *work, *basis; // owned, of the water's solver (seepage.c)
+    int work_capacity, basis_capacity;
 } silt_seep;
 
 static inline bool silt_seep_on(const silt_scene *scene) { return scene->bed.on && scene->fluid.on && scene->bed.seepage != SEEPAGE_NONE; }
@@ -54,10 +54,12 @@ silt_status silt_seep_prepare(silt_seep *seep, silt_bed *bed, const silt_scene *
                               silt_error *err);
 /** taken += what the bed takes from the water's nodes at the pressure p, m3/s; what comes out of a dry face comes to its foot */
 void silt_seep_take(silt_seep *seep, const double *p, double *taken);
-/** out += what it takes from them more when the pressure rises by x: symmetric, not negative */
+/** out += what it takes from them more when the pressure rises by x: symmetric and not negative where no face is */
 void silt_seep_apply(silt_seep *seep, const double *x, double *out);
 /** The water's step is solved: the pressure in the bed, discharge, gradients. */
 void silt_seep_accept(silt_seep *seep, silt_bed *bed, const silt_scene *scene, const double *p);
+/** Discharge and gradients for the bed as it is now, after silt_seep_fit */
+void silt_seep_results(silt_seep *seep, const silt_bed *bed, const silt_scene *scene);
 /** pressure in the bed at a place; false outside of it */
 bool silt_seep_pressure_at(const silt_bed *bed, const double *x, double *pressure);
 silt_status silt_seep_save(const silt_seep *seep, silt_store *store, silt_error *err);

@@ -207,7 +207,7 @@ KERNEL continuity(const int D, const silt_fluid *f, const silt_mesh *mesh, int e
 
 void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_drag *drag, const double *rate, const double *v,
                               const double *p) {
-    const double *taken = f->seep ? silt_seepage_taken(f, p) : NULL;
+    const double *taken = f->seep ? silt_seepage_taken(f, mesh, p) : NULL;
     SILT_PARALLEL(f->n_node)
     for (int j = 0; j < f->n_node; j++) {
         const double asked = -(rate ? rate[j] : 0) - (drag ? drag->source[j] : 0) + (taken ? taken[j] : 0);

@@ -2,8 +2,8 @@
 #include "fluid.h"
 
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
-#define FLUID_WHOLE 4.0     // the same, in the mean, from which momentum and continuity are factored as one
-#define FLUID_SLOW 8         // passes after which stiff cells, few as they are, bring that too
+#define FLUID_WHOLE 2.5     // the same, in the mean, from which momentum and continuity are factored as one
+#define FLUID_SLOW 12        // passes after which stiff cells, few as they are, bring that too
 #define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
 #define EXPLICIT_SHARE 0.02 // of the water that may be too stiff for explicit viscosity: slivers
 #define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
@@ -13,6 +13,9 @@
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 #define FLUID_INNER 1e4     // accuracy of a pressure increment over that of the step, at least: refreshes are counted, so what an
                             // increment lacks does not all come back
+#define FLUID_ROUGH 10      // times that in space, before a refresh, which leaves a third of the residual whatever the increment was: 9
+                            // of 46 conjugate gradients a step in the collapse
+#define FLUID_PAID  0.1     // the same of each of the two solves for debts in space: 4 of 41
 
 void silt_fluid_clear(silt_fluid *f) {
     double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->start, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
@@ -358,7 +361,7 @@ static silt_status pressure_increment(silt_fluid *f, const silt_step *s, bool se
     SILT_PARALLEL(f->n_node)
     for (int j = 0; j < f->n_node; j++)
         f->residual[j] = s->mesh->wet[j] ? -f->residual[j] : 0;
-    tolerance = silt_min(tolerance, FLUID_INNER * s->scene->fluid.tolerance);
+    tolerance *= silt_min(1, 100 * FLUID_INNER * s->scene->fluid.tolerance);
     if (seeps && f->seep)
         SILT_CLOCKED(solve, status = silt_seepage_solve(f, s, f->residual, tolerance, f->increment, err));
     else
@@ -411,7 +414,7 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
             silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
         for (int i = 0; i < f->n_node; i++)
             f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
-        SILT_TRY(pressure_increment(f, s, false, 0.03, err));
+        SILT_TRY(pressure_increment(f, s, false, D == 3 ? FLUID_PAID : 0.03, err));
         silt_fluid_correct(f, s, f->increment, f->shift);
     }
     return SILT_OK;
@@ -700,7 +703,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         if (whole)
             SILT_TRY(correct_whole(f, s, err));
         else
-            SILT_TRY(pressure_increment(f, s, true, 0.01, err));
+            SILT_TRY(pressure_increment(f, s, true, refresh && !first && D == 3 ? FLUID_ROUGH * 0.01 : 0.01, err));
         if (!whole)
             silt_fluid_correct(f, s, f->increment, f->w);
         if (!direct && (split || stiff > FLUID_STIFF)) {
@@ -739,6 +742,8 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         f->mobile[i] = 1;
         f->withheld[i] = f->residual[i] = 0;
     }
+    if (f->seep)
+        silt_seepage_begin(f, s);
     resist_begin(f, s);
     if (f->shift)
         memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);

@@ -137,6 +137,8 @@ int silt_level_sides(const silt_walls *walls, const silt_opening *opening, const
 void silt_level_way(const silt_opening *opening, int n, const double *const side[3], double way[3]);
 /** how a node on an opening with a level is held: silt_walls_hold */
 silt_hold silt_level_hold(const silt_step *step, int i, double vector[3]);
+/** area vector of a facet with the nodes at x, out of the water */
+void silt_facet_vector(const silt_mesh *mesh, int dim, const double *x, const int *facet, double vector[3]);
 /** Pressure of the water behind openings, p = rho g (level - height), less rho u^2/2 where it comes in: level_force and
  * level_brake, the latter added to friction. */
 void silt_levels_load(silt_fluid *fluid, const silt_step *step);
@@ -225,10 +227,12 @@ void silt_pressure_forget(silt_pressure *pressure);
 void silt_fluid_correct(silt_fluid *fluid, const silt_step *step, const double *q, double *v);
 
 // seepage.c -----------------------------------------------------------------------------------------------
+/** once a step */
+void silt_seepage_begin(silt_fluid *fluid, const silt_step *step);
 /** what the bed takes from each node at the pressure p, m3/s */
-const double *silt_seepage_taken(silt_fluid *fluid, const double *p);
-/** increment = (S + L + B)^-1 right, B what the bed takes of the water for its pressure: conjugate gradients with silt_pressure_solve
- * before them, to `tolerance` relative to the right side. */
+const double *silt_seepage_taken(silt_fluid *fluid, const silt_mesh *mesh, const double *p);
+/** increment = (S + L + B)^-1 right, B what the bed takes of the water for its pressure: flexible GMRES with silt_pressure_solve
+ * before it, to `tolerance` relative to the right side. */
 silt_status silt_seepage_solve(silt_fluid *fluid, const silt_step *step, const double *right, double tolerance, double *increment,
                                silt_error *err);
 

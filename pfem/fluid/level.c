@@ -57,8 +57,7 @@ silt_hold silt_level_hold(const silt_step *s, int i, double vector[3]) {
     return HOLD_LINE;
 }
 
-// area vector of a facet on the midpoint mesh, out of the water
-static void facet_vector(const silt_mesh *mesh, int dim, const double *x, const int *facet, double vector[3]) {
+void silt_facet_vector(const silt_mesh *mesh, int dim, const double *x, const int *facet, double vector[3]) {
     double u[3] = {0}, w[3] = {0};
     for (int d = 0; d < dim; d++) {
         u[d] = silt_shortest(mesh, d, x[dim * facet[1] + d] - x[dim * facet[0] + d]);
@@ -86,7 +85,7 @@ void silt_levels_load(silt_fluid *f, const silt_step *s) {
         const silt_opening o = silt_opening_of(s->scene, s->nodes->owner[facet[0]]);
         const double level = silt_series_at(o.level, 1, s->time + 0.5 * s->dt);
         double vector[3], p[3], sum = 0;
-        facet_vector(mesh, D, f->x_mid, facet, vector);
+        silt_facet_vector(mesh, D, f->x_mid, facet, vector);
         for (int a = 0; a < D; a++)
             sum += p[a] = weight * silt_max(0, level - f->x_mid[D * facet[a] + up]);
         for (int a = 0; a < D; a++) {

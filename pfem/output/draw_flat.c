@@ -68,7 +68,8 @@ void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, i
                     continue;
                 for (int j = grid.offset[i]; j < grid.offset[i + 1]; j++) {
                     const double *x = grid.x + 3 * grid.link[j];
-                    counts[grid.link[j]] = true;
+                    // empty ground has no pressure
+                    counts[grid.link[j]] = k != 1 || !grid.value || grid.value[grid.link[j]] >= 0;
                     double r = grid.radius ? grid.radius[grid.link[j]] : 0;
                     draw_extend(lo, hi, x[0] - r, x[1] - r);
                     draw_extend(lo, hi, x[0] + r, x[1] + r);
@@ -103,8 +104,9 @@ void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, i
 
 // ---------------------------------------------------------------- triangles
 
-// fills a triangle pixel by pixel: the value is interpolated, then coloured
-static void draw_triangle(silt_draw_canvas *c, const silt_grid *grid, const int node[3], const silt_draw_colour *flat) {
+// fills a triangle pixel by pixel: the value is interpolated, then coloured; below nought with `under`, if it is given
+static void draw_triangle(silt_draw_canvas *c, const silt_grid *grid, const int node[3], const silt_draw_colour *flat,
+                          const silt_draw_colour *under) {
     double px[3], py[3];
     for (int k = 0; k < 3; k++) {
         px[k] = draw_x(c, grid->x[3 * node[k]]);
@@ -132,7 +134,7 @@ static void draw_triangle(silt_draw_canvas *c, const silt_grid *grid, const int 
                 ink = *flat;
             } else {
                 double value = a * grid->value[node[0]] + b * grid->value[node[1]] + (1 - a - b) * grid->value[node[2]];
-                ink = silt_draw_value(c, value);
+                ink = under && value < 0 ? *under : silt_draw_value(c, value);
             }
             row[x] = 0xff000000u | (uint32_t)lround(255 * ink.r) << 16 | (uint32_t)lround(255 * ink.g) << 8 |
                      (uint32_t)lround(255 * ink.b);
@@ -181,7 +183,7 @@ static void draw_water(silt_draw_canvas *c, int number) {
     cairo_surface_flush(c->surface);
     for (int i = 0; i < grid.n_cell; i++)
         if (silt_grid_corners(&grid, i) == 3)
-            draw_triangle(c, &grid, grid.link + grid.offset[i], grid.value ? NULL : &plain);
+            draw_triangle(c, &grid, grid.link + grid.offset[i], grid.value ? NULL : &plain, NULL);
     cairo_surface_mark_dirty(c->surface);
     if (mesh)
         draw_edges(c, &grid, true, 0x4f86ab, 0.6);
@@ -209,7 +211,7 @@ static void draw_bed(silt_draw_canvas *c, int number) {
         double density = dense && c->density > 0 ? cells.value[i] / c->density : 1;
         // the upper half of the scale: even loose sand is sand
         silt_draw_colour sand = silt_draw_mix(draw_sand, sizeof draw_sand / sizeof *draw_sand, 2 * density - 1);
-        draw_triangle(c, &grid, grid.link + grid.offset[i], grid.value ? NULL : &sand);
+        draw_triangle(c, &grid, grid.link + grid.offset[i], grid.value ? NULL : &sand, &sand);
     }
     cairo_surface_mark_dirty(c->surface);
     if (strcmp(c->field->name, "mesh") == 0)

@@ -59,6 +59,10 @@ int silt_gauge_columns(const silt_scene *scene, int i) {
     case GAUGE_VELOCITY:
     case GAUGE_FORCE:
     case GAUGE_CENTROID:
+    case GAUGE_GRAIN_PLACE:
+    case GAUGE_GRAIN_VELOCITY:
+    case GAUGE_GRAIN_SPIN:
+    case GAUGE_GRAIN_FORCE:
         return 3;
     case GAUGE_GRAINS:
         return 4;
@@ -452,17 +456,28 @@ static double gauge_flux(const silt_view *view, int e, const silt_gauge_def *def
     return flux * (s1 - s0);
 }
 
+// the same of Darcy's velocity in a cell of the bed
+static double gauge_seepage(const silt_bed *bed, int c, const silt_gauge_def *def, double s0, double s1) {
+    const double dx = def->to[0] - def->from[0], dy = def->to[1] - def->from[1];
+    return (bed->darcy[2 * c] * dy - bed->darcy[2 * c + 1] * dx) * (s1 - s0);
+}
+
 static double gauge_discharge(silt_gauges *g, const silt_view *view, const silt_gauge_def *def) {
-    const silt_mesh *mesh = view->mesh;
+    const silt_bed *bed = view->bed && view->bed->darcy ? view->bed : NULL;
+    const int n_water = view->mesh->n_cell, n_cell = n_water + (bed ? bed->n_cell : 0); // those of the bed come after the water's
     int n = 0, capacity = g->cell_capacity;
     if (silt_nodes_dim(view->nodes) == 3)
         return NAN;
-    SILT_RESERVE(g->span, capacity, mesh->n_cell + 1);
-    SILT_RESERVE(g->span_cell, g->cell_capacity, mesh->n_cell + 1);
+    SILT_RESERVE(g->span, capacity, n_cell + 1);
+    SILT_RESERVE(g->span_cell, g->cell_capacity, n_cell + 1);
     // a section crosses few cells: kept in rising order by insertion
-    for (int i = 0; i < mesh->n_cell; i++) {
+    for (int i = 0; i < n_cell; i++) {
         double s[2], x[6];
-        gauge_corners(view, i, def->from, x);
+        if (i < n_water)
+            gauge_corners(view, i, def->from, x);
+        else
+            for (int a = 0; a < 3; a++)
+                memcpy(x + 2 * a, bed->x[bed->cell[i - n_water][a]], 2 * sizeof *x);
         if (!gauge_clip(x, def->from, def->to, s))
             continue;
         int j = n++;
@@ -477,8 +492,9 @@ static double gauge_discharge(silt_gauges *g, const silt_view *view, const silt_
     double flux = 0, covered = 0;
     for (int j = 0; j < n; j++) {
         double s0 = silt_max(g->span[j][0], covered), s1 = g->span[j][1];
+        const int i = g->span_cell[j];
         if (s1 > s0)
-            flux += gauge_flux(view, g->span_cell[j], def, s0, s1);
+            flux += i < n_water ? gauge_flux(view, i, def, s0, s1) : gauge_seepage(bed, i - n_water, def, s0, s1);
         covered = silt_max(covered, s1);
     }
     return flux;
@@ -569,7 +585,9 @@ void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value)
             double level = view->bed ? silt_bed_level(view->bed, def->from) : -HUGE_VAL;
             if (level > -HUGE_VAL)
                 value[0] = def->kind == GAUGE_SCOUR ? gauges->start[i] - level : level;
-        } else if (def->kind == GAUGE_GRAIN_FRONT || def->kind == GAUGE_GRAIN_HEIGHT || def->kind == GAUGE_GRAIN_SLOPE) {
+        } else if (def->kind >= GAUGE_GRAIN_PLACE && def->kind <= GAUGE_GRAIN_FORCE) {
+            silt_grain_gauge(view, def, value);
+        } else if (def->kind >= GAUGE_GRAIN_FRONT && def->kind <= GAUGE_GRAIN_SLOPE) {
             if (!heap)
                 silt_heap_find(&gauges->heap, view);
             heap = true;

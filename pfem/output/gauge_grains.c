@@ -150,3 +150,23 @@ double silt_heap_gauge(const silt_heap *heap, const silt_view *view, const silt_
     }
     return best > -HUGE_VAL ? sign * best : NAN;
 }
+
+void silt_grain_gauge(const silt_view *view, const silt_gauge_def *def, double value[3]) {
+    const silt_grain_state *grains = view->grains;
+    int low = 0, high = grains ? grains->count : 0;
+    while (low < high) {
+        const int middle = low + (high - low) / 2;
+        if (grains->id[middle] < def->index)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    if (!grains || low == grains->count || grains->id[low] != def->index)
+        return;
+    const double *from = def->kind == GAUGE_GRAIN_PLACE      ? grains->x
+                         : def->kind == GAUGE_GRAIN_VELOCITY ? grains->v
+                         : def->kind == GAUGE_GRAIN_SPIN     ? grains->omega
+                                                             : grains->contact;
+    if (from)
+        memcpy(value, from + 3 * low, 3 * sizeof *value);
+}

@@ -51,6 +51,8 @@ void silt_heap_find(silt_heap *heap, const silt_view *view);
 /** front, height or slope of the heap that was found; NaN where there is none */
 double silt_heap_gauge(const silt_heap *heap, const silt_view *view, const silt_gauge_def *def);
 void silt_heap_clear(silt_heap *heap);
+/** place, velocity, spin or contact force of one grain; value keeps what it holds where that is gone */
+void silt_grain_gauge(const silt_view *view, const silt_gauge_def *def, double value[3]);
 /** what gauges keep from the start goes through checkpoints: after a resume create, then load */
 silt_status silt_gauges_save(const silt_gauges *gauges, silt_store *store, silt_error *err);
 silt_status silt_gauges_load(silt_gauges *gauges, silt_store *store, silt_error *err);

@@ -83,7 +83,10 @@ silt_status silt_run_grains(silt_run *run, int n, double before, bool again, sil
     load_bodies(run, before, again);
     silt_nodes moving = run->nodes; // with the velocity that the drag was solved with
     moving.v = run->fluid.w ? run->fluid.w : run->nodes.v;
+    moving.x = run->fluid.x_mid ? run->fluid.x_mid : run->nodes.x; // where its pressure acted
     silt_coupling_dem.load(run->coupling, &moving, &run->mesh, run->dt);
+    if (run->scene->grains.random_walk && run->fluid.mu)
+        silt_coupling_dem.walk(run->coupling, &run->nodes, &run->mesh, run->fluid.mu, run->dt, run->step);
     if (!again && !silt_run_set_up_due(run))
         silt_coupling_dem.keep(run->coupling);
     SILT_TRY(silt_coupling_dem.start(run->coupling, n, err));

@@ -263,6 +263,7 @@ static void seepage_book(silt_run *run) {
     ledger->seepage_lost += run->seep.lost * run->dt;
     ledger->outflow_mass += run->scene->fluid.density * run->seep.lost * run->dt;
     silt_seep_fit(&run->seep, &run->bed, &run->nodes);
+    silt_seep_results(&run->seep, &run->bed, run->scene);
 }
 
 static silt_status run_step(silt_run *run, silt_error *err) {

@@ -5,6 +5,10 @@
 #define DEPOSIT_SPEED 0.05  // of sqrt((s - 1) g d)
 #define DEPOSIT_FORCE 0.1   // net force, of the submerged weight
 #define DEPOSIT_TIME 10     // times sqrt(d/g), at rest for so long
+#define PARCELS_MOST 256    // of one patch
+#define DEPOSIT_PATIENCE 5  // times that: what finds no sound place goes into pores
+#define DEPOSIT_PORES 0.5   // of the bed's porosity: what pores are filled to at most
+#define DEPOSIT_SHIELDS 0.8 // of the stress that moves grains
 #define RELEASE_MOST 64     // patches in one step
 #define ROOM_SIDES 19       // places beside each on the way out
 #define RELEASE_LONG 4      // radii: a parcel that had to look farther goes up through the heap on it
@@ -36,6 +40,31 @@ static double cell_water(const silt_run *run, int cell) {
     return solid + run->scene->bed.saturation * (run->bed.area[cell] - solid);
 }
 
+// a parcel's mass is a power of its diameter: 2 or 3 in the plane, by the width that it is counted with, 3 in space
+static double parcel_power(const silt_run *run, double mass) {
+    return log(8) / log(silt_coupling_dem.parcel_radius(run->coupling, 8 * mass) / silt_coupling_dem.parcel_radius(run->coupling, mass));
+}
+
+// kg/m of the parcels that a patch becomes, whose sum is its mass to the last bit: equal ones, or by the sieve curve
+static int parcel_shares(const silt_run *run, const silt_patch *patch, double share[PARCELS_MOST]) {
+    const silt_scene *scene = run->scene;
+    const double d_patch = 2 * silt_coupling_dem.parcel_radius(run->coupling, patch->mass);
+    int n = scene->grains.per_patch;
+    bool drawn = false;
+    if (scene->grains.sieve.n_row) {
+        const uint64_t seed = silt_hash(silt_hash(0, &scene->fluid.seed, sizeof scene->fluid.seed), &patch->node, sizeof patch->node);
+        n = silt_sieve_draw(&scene->grains.sieve, seed, d_patch, parcel_power(run, patch->mass), PARCELS_MOST, share);
+        drawn = true;
+    } else if (n == 0)
+        n = (int)silt_clamp(floor(pow(d_patch / scene->grains.parcel, run->bed.dim == 3 ? 3 : 2) + 0.5), 1, PARCELS_MOST);
+    double left = patch->mass;
+    for (int k = 0; k < n; k++) {
+        share[k] = k + 1 < n ? patch->mass * (drawn ? share[k] : 1.0 / n) : left;
+        left -= share[k];
+    }
+    return n;
+}
+
 static void release_node(silt_run *run, int node) {
     const silt_scene *scene = run->scene;
     silt_patch patch;
@@ -45,16 +74,14 @@ static void release_node(silt_run *run, int node) {
     for (int k = 0; k < patch.n_cell; k++)
         remember_cell(run, run->bed.cell[patch.cell[k]], cell_water(run, patch.cell[k]), true);
     silt_bed_release(&run->bed, scene, &patch);
-    run->ledger.released_mass += patch.mass;
+    silt_sum(&run->ledger.released_mass, &run->ledger.released_rest, patch.mass);
 
-    // equal parcels near the wanted size
-    const double d = scene->grains.parcel, r_patch = silt_coupling_dem.parcel_radius(run->coupling, patch.mass);
-    const double ratio = 2 * r_patch / d, most = silt_square(ratio) * (run->bed.dim == 3 ? ratio : 1);
-    const int n = (int)silt_max(1, floor(most + 0.5));
+    double share[PARCELS_MOST];
+    const int n = parcel_shares(run, &patch, share);
     for (int k = 0; k < n; k++) {
         SILT_RESERVE(run->waiting, run->waiting_capacity, run->n_waiting + 1);
         silt_waiting *waiting = &run->waiting[run->n_waiting++];
-        *waiting = (silt_waiting){.mass = patch.mass / n, .reach = silt_max(patch.height, 2 * r_patch)};
+        *waiting = (silt_waiting){.mass = share[k], .reach = silt_max(patch.height, 2 * silt_coupling_dem.parcel_radius(run->coupling, patch.mass))};
         memcpy(waiting->x, patch.centre, sizeof waiting->x);
         memcpy(waiting->normal, patch.normal, sizeof waiting->normal);
     }
@@ -83,6 +110,15 @@ static void release_hanging(silt_run *run) {
     for (int k = 0; k < n; k++)
         if (bed->alive[hanging[k]] && bed->exposed[hanging[k]])
             release_node(run, hanging[k]);
+}
+
+// slopes steeper than the angle of repose
+static void release_steep(silt_run *run) {
+    int steep[RELEASE_MOST];
+    const int n = silt_bed_steep(&run->bed, run->scene, RELEASE_MOST, steep);
+    for (int k = 0; k < n; k++)
+        if (run->bed.alive[steep[k]] && run->bed.exposed[steep[k]])
+            release_node(run, steep[k]);
 }
 
 // Seepage that outweighs the grains lifts them off: nodes on a surface that looks up, where its force is their weight under water
@@ -123,8 +159,10 @@ void silt_run_release(silt_run *run) {
             if (run->bed.alive[due[k]])
                 release_node(run, due[k]);
     }
-    if (silt_bed_erodes(&run->scene->bed))
+    if (silt_bed_erodes(&run->scene->bed)) {
         release_hanging(run);
+        release_steep(run);
+    }
     if (run->coupling && run->bed.revision != run->bed_revision) {
         silt_coupling_dem.bed_changed(run->coupling, &run->bed);
         run->bed_revision = run->bed.revision;
@@ -227,7 +265,7 @@ void silt_run_place(silt_run *run) {
 static bool grain_slow(const silt_run *run, const silt_grain_state *grains, int k) {
     const silt_scene *scene = run->scene;
     const double lighter = scene->fluid.on ? scene->bed.density / scene->fluid.density - 1 : 1;
-    return hypot(hypot(grains->v[3 * k], grains->v[3 * k + 1]), grains->v[3 * k + 2]) <
+    return silt_length(3, grains->v + 3 * k) <
            DEPOSIT_SPEED * sqrt(silt_max(lighter, 0.01) * gravity_of(scene) * 2 * grains->radius[k]);
 }
 
@@ -236,7 +274,30 @@ static bool grain_rests(const silt_run *run, const silt_grain_state *grains, int
     const silt_scene *scene = run->scene;
     const double weight =
         grains->mass[k] * gravity_of(scene) * (scene->fluid.on ? 1 - scene->fluid.density / scene->bed.density : 1);
-    return grains->net_force[k] < DEPOSIT_FORCE * weight && grains->contacts[k] >= (run->bed.dim == 3 ? 3 : 2) && grains->on_bed[k];
+    return grains->net_force[k] < DEPOSIT_FORCE * weight && grains->on_bed[k];
+}
+
+// the water there would not move it again
+static bool water_calm(const silt_run *run, const double *x) {
+    return !run->scene->fluid.on || silt_bed_shear_at(&run->bed, x) < DEPOSIT_SHIELDS * silt_bed_motion(run->scene);
+}
+
+// A parcel at rest becomes bed: in looser cells where the scene says so, as new cells, and where these find no sound place for long, or
+// it lies under them, in the pores of the cells around it. rested: in sqrt(d/g)
+static bool deposit_parcel(silt_run *run, const double *x, double r, double mass, double rested, silt_deposit *deposit) {
+    const silt_scene *scene = run->scene;
+    const double size = scene->bed.size, near = r + size, far = r + 3 * size, loose = scene->bed.porosity;
+    const bool buried = silt_bed_contains(&run->bed, x);
+    if (!buried && !water_calm(run, x))
+        return false;
+    if (scene->bed.densify && silt_bed_densify(&run->bed, scene, x, near, loose, mass, deposit) != DEPOSIT_REFUSED)
+        return true;
+    if (!buried && silt_bed_deposit(&run->bed, scene, x, r, mass, deposit) != DEPOSIT_REFUSED)
+        return true;
+    if (!buried && rested < DEPOSIT_PATIENCE * DEPOSIT_TIME)
+        return false;
+    return silt_bed_densify(&run->bed, scene, x, far, loose, mass, deposit) != DEPOSIT_REFUSED ||
+           silt_bed_densify(&run->bed, scene, x, far, DEPOSIT_PORES * loose, mass, deposit) != DEPOSIT_REFUSED;
 }
 
 // new bed cells take their place from the water at the next rebuild
@@ -262,13 +323,17 @@ silt_status silt_run_deposit(silt_run *run, silt_error *err) {
         const double had = old < run->n_rest && run->rest[old].id == grains->id[k] ? run->rest[old].time : 0;
         if (!grain_slow(run, grains, k))
             continue;
-        const bool rests = grain_rests(run, grains, k);
-        const double now = had + (rests ? run->dt : 0);
+        // what new cells have buried is bed
+        const bool rests = grain_rests(run, grains, k) || silt_bed_contains(&run->bed, grains->x + 3 * k);
+        // balanced on one point: the clock runs slowly
+        const double pace = grains->contacts[k] >= (scene->dimension == 3 ? 3 : 2) ? 1 : 1.0 / DEPOSIT_PATIENCE;
+        const double now = had + (rests ? pace * run->dt : 0);
         if (rests && now > DEPOSIT_TIME * sqrt(2 * grains->radius[k] / silt_max(g, 1e-12))) {
             silt_deposit deposit = {0};
-            if (silt_bed_deposit(&run->bed, scene, grains->x + 3 * k, grains->radius[k], grains->mass[k], &deposit) != DEPOSIT_REFUSED) {
+            const double *x = grains->x + 3 * k, r = grains->radius[k], mass = grains->mass[k];
+            if (deposit_parcel(run, x, r, mass, now * sqrt(g / (2 * r)), &deposit)) {
                 silt_coupling_dem.deposit(run->coupling, k);
-                run->ledger.deposited_mass += grains->mass[k];
+                silt_sum(&run->ledger.deposited_mass, &run->ledger.deposited_rest, mass);
                 remember_grown(run, &deposit);
                 changed = true;
                 continue;

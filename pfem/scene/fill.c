@@ -42,8 +42,7 @@ static double sieve_moment(const silt_series *sieve, int power) {
     return sum;
 }
 
-// diameter that the share q of all grains, by number, is smaller than
-static double sieve_quantile(const silt_series *sieve, double q) {
+double silt_sieve_quantile(const silt_series *sieve, double q) {
     double left = q * sieve_moment(sieve, 0);
     for (int i = 0; i + 1 < sieve->n_row; i++) {
         const double *row = sieve->value + 2 * i, a = row[0], b = row[2], share = (row[3] - row[1]) / (b - a);
@@ -53,6 +52,21 @@ static double sieve_quantile(const silt_series *sieve, double q) {
         left -= part;
     }
     return sieve->value[2 * sieve->n_row - 2];
+}
+
+int silt_sieve_draw(const silt_series *sieve, uint64_t seed, double whole, double power, int capacity, double *share) {
+    double sum = 0;
+    int n = 0;
+    for (; n < capacity; n++) {
+        share[n] = pow(silt_sieve_quantile(sieve, silt_uniform(&seed)) / whole, power);
+        // the last one is kept when more than its half has room
+        if (n > 0 && sum + 0.5 * share[n] > 1)
+            break;
+        sum += share[n];
+    }
+    for (int k = 0; k < n; k++)
+        share[k] /= sum;
+    return n;
 }
 
 // area or volume of a grain in the mean
@@ -72,7 +86,7 @@ static void fill_sizes(fill_state *f) {
     const silt_fill_def *fill = f->fill;
     f->radius = silt_alloc((size_t)f->n + 1, sizeof *f->radius);
     for (int i = 0; i < f->n; i++)
-        f->radius[i] = 0.5 * (fill->diameter > 0 ? fill->diameter : sieve_quantile(&fill->sieve, (f->n - i - 0.5) / f->n));
+        f->radius[i] = 0.5 * (fill->diameter > 0 ? fill->diameter : silt_sieve_quantile(&fill->sieve, (f->n - i - 0.5) / f->n));
     f->wide = f->n > 0 ? f->radius[0] : fill_widest(fill);
 }
 

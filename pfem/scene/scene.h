@@ -190,6 +190,8 @@ typedef struct silt_bed_def {
     double repose;    // degrees, angle of repose; 0: a bed that stands at any slope
     bool slope;       // default true: with repose, the threshold hangs on the slope
     bool cover;       // default true: what resting parcels cover does not wear
+    int densify;       // key deposit: densify: resting grains first fill what is looser than the bed; default grow
+    double deposit_work; // J/m3, W_c of what was deposited; 0: work
     double saturation; // share of the pores that holds water, default 1
     silt_seepage seepage; // seepage: none | darcy | kozeny-carman
     double permeability;  // m2, with seepage: darcy
@@ -244,12 +246,16 @@ typedef struct silt_grains_def {
     silt_drag_law drag;   // drag: none | stokes | schiller-naumann | ..., docs/grains.md
     double diameter;      // m, d50 of the bed's grains: default parcel
     double parcel;        // m, diameter of the discrete elements that released bed becomes; required with a bed
+    int per_patch;        // parcels that a patch of the bed becomes; 0: as many of the size `parcel` as make its mass
+    silt_series sieve;    // diameter in m, share of the mass that passes, of the parcels; n_row 0: all alike
     double width;         // m, accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel, or 5 d without bed
     double kernel;        // m, width of the porosity kernel; 0: max(3 d, 2 h)
     double added_mass;    // 0, coefficient, of the displaced water's mass; spheres: 0.5
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false
     bool rotational_drag; // torque on the spin, default false
+    bool random_walk;     // of suspended grains in the eddies, default false
+    double schmidt;       // 1, eddy viscosity over the grains' diffusivity
     int n_grain;
     silt_grain_def *grain; // owned; key `list`
     int n_fill;
@@ -261,7 +267,8 @@ typedef struct silt_grains_def {
 /** contact properties of grains, bodies and walls; block `contact`, required with grains, bed or bodies */
 typedef struct silt_contact_def {
     bool on;
-    double youngs_modulus;   // Pa, 5e6 to 1e9
+    double youngs_modulus;   // Pa, 5e6 to 1e12
+    double wall_modulus;     // Pa, Young's modulus of the walls; default youngs_modulus
     double poissons_ratio;
     double restitution;      // 0.05 to 1
     double friction;
@@ -307,6 +314,10 @@ typedef enum {
     GAUGE_GRAIN_FRONT,  // grains_front: x | -x: the foremost x of the grains that hang together
     GAUGE_GRAIN_HEIGHT, // grains_height_at: X (3-D: [x, y]): their top above that place
     GAUGE_GRAIN_SLOPE,  // grains_slope: [x0, x1]: degrees by which it falls to the right, from x0 = from[0] to x1 = from[1]
+    GAUGE_GRAIN_PLACE,    // grain_place: K: of grain K (silt_gauge_def.index): columns NAME_x, NAME_y, NAME_z
+    GAUGE_GRAIN_VELOCITY, // grain_velocity: K
+    GAUGE_GRAIN_SPIN,     // grain_spin: K
+    GAUGE_GRAIN_FORCE,    // grain_force: K: of its contacts
     GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
 } silt_gauge_kind;
@@ -415,6 +426,11 @@ static inline double silt_bed_roughness(const silt_scene *s) {
     return s->bed.roughness > 0 ? s->bed.roughness : 2.5 * s->grains.diameter;
 }
 
+/** diameter that the share q of all grains of a sieve curve, by number, is smaller than, m (fill.c) */
+double silt_sieve_quantile(const silt_series *sieve, double q);
+/** Grains drawn from a sieve curve whose mass is that of one of diameter `whole`, when mass goes with diameter^power: the same for the
+ * same seed. All are scaled alike so that their shares of the mass add up to 1 but for rounding. @return how many */
+int silt_sieve_draw(const silt_series *sieve, uint64_t seed, double whole, double power, int capacity, double *share);
 /** all grains that are there at the start: the list's, then the regions' */
 static inline int silt_scene_grains(const silt_scene *s) { return s->grains.n_grain + s->grains.n_filled; }
 static inline const silt_grain_def *silt_scene_grain(const silt_scene *s, int i) {

@@ -16,6 +16,8 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     if (scene->dimension == 3) {
         // the others were refused already
         bodies = NULL;
+        if (bed && grains)
+            silt_complain_key(reader, bed, "key 'bed': found it with grains, allowed without them in three dimensions so far (work: .inf)");
         if (!fluid)
             silt_complain(
                 reader, root,
@@ -721,7 +723,8 @@ static void check_gauges(silt_reader *reader, const silt_scene *scene) {
             silt_complain(reader, silt_tree_item(node, "force_on"),
                           "key 'gauges.%d.force_on': found %d, allowed the number of a wall, the first is 0; there are %d", i,
                           gauge->index, scene->n_wall);
-        const bool grains = gauge->kind == GAUGE_GRAIN_FRONT || gauge->kind == GAUGE_GRAIN_HEIGHT || gauge->kind == GAUGE_GRAIN_SLOPE;
+        const bool grain = gauge->kind >= GAUGE_GRAIN_PLACE && gauge->kind <= GAUGE_GRAIN_FORCE;
+        const bool grains = grain || (gauge->kind >= GAUGE_GRAIN_FRONT && gauge->kind <= GAUGE_GRAIN_SLOPE);
         if (grains && !scene->grains.on)
             silt_complain(reader, node, "key 'gauges.%d': found a gauge of grains, allowed in a scene with a block grains", i);
         if (gauge->kind == GAUGE_EXTENT && gauge->from[0] == 2 && scene->dimension != 3)

@@ -37,6 +37,7 @@ uint64_t silt_scene_hash(const silt_scene *scene) {
     }
     for (int i = 0; i < fluid->n_region; i++)
         hash = hash_outline(hash, &fluid->region[i]);
+    hash = hash_series(hash, &scene->grains.sieve);
     for (int i = 0; i < scene->bed.n_region; i++)
         hash = hash_outline(hash, &scene->bed.region[i]);
     for (int i = 0; i < fluid->n_size; i++)

@@ -38,6 +38,7 @@ static const silt_word law_words[] = {{"frictional-work", BED_FRICTIONAL_WORK}, 
                                       {"shields", BED_SHIELDS}, {0}};
 static const silt_word shear_words[] = {{"default", SHEAR_DEFAULT}, {"paper", SHEAR_PAPER}, {"gradient", SHEAR_GRADIENT},
                                         {"log-law", SHEAR_LOG_LAW}, {0}};
+static const silt_word deposit_words[] = {{"grow", 0}, {"densify", 1}, {0}};
 static const silt_word seepage_words[] = {
     {"none", SEEPAGE_NONE}, {"darcy", SEEPAGE_DARCY}, {"kozeny-carman", SEEPAGE_KOZENY_CARMAN}, {0}};
 static const silt_word drag_words[] = {
@@ -397,6 +398,11 @@ static const silt_key bed_rows[] = {
      .doc = "seepage that outweighs the grains on the surface lifts them off"},
     {"deposition", KEY_SWITCH, .fallback = "true", AT(silt_bed_def, deposition),
      .doc = "resting grains become bed again"},
+    {"deposit", KEY_WORD, .fallback = "grow", .words = deposit_words, AT(silt_bed_def, densify),
+     .doc = "resting grains become new cells of the bed, or first fill cells that are looser than porosity"},
+    {"deposit_work", KEY_NUMBER, .unit = "J/m3", .fallback = "0", NOT_NEGATIVE, AT(silt_bed_def, deposit_work),
+     .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION) | ONLY(BED_POWER),
+     .doc = "`work` of what was deposited; 0: the same"},
     {"condition", KEY_WORD, .fallback = "no-slip", .words = condition_words, AT(silt_bed_def, condition),
      .doc = "of the water on the bed"},
     {"regions", KEY_LIST, .sub = &region_table, MANY(silt_bed_def, n_region, region),
@@ -440,6 +446,11 @@ static const silt_key grains_rows[] = {
     {"drag", KEY_WORD, .fallback = "di-felice", .words = drag_words, AT(silt_grains_def, drag), .doc = "drag law"},
     {"parcel", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, parcel),
      .doc = "diameter of the elements that released bed becomes; needed with a bed"},
+    {"per_patch", KEY_INTEGER, .fallback = "0", RANGE(0, 64), AT(silt_grains_def, per_patch),
+     .doc = "how many parcels a patch of the bed becomes; 0: as many of the diameter parcel as make its mass"},
+    {"sieve", KEY_TABLE, .flags = KEY_OPTIONAL, AT(silt_grains_def, sieve),
+     .doc = "CSV file beside the scene: diameter in m, share of the mass that passes (from 0 to 1), columns diameter, passing; the diameters "
+            "of the parcels, drawn by fluid.seed and node"},
     {"diameter", KEY_NUMBER, .unit = "m", .fallback = "=grains.parcel", NOT_NEGATIVE, AT(silt_grains_def, diameter),
      .doc = "of the grains that a parcel stands for, for the drag"},
     {"width", KEY_NUMBER, .unit = "m", .fallback = "0", .flags = KEY_PLANE, NOT_NEGATIVE, AT(silt_grains_def, width),
@@ -453,6 +464,10 @@ static const silt_key grains_rows[] = {
      .doc = "force of the water's viscous stress on the grain's volume"},
     {"rotational_drag", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, rotational_drag),
      .doc = "torque of the water on grains that spin otherwise than it does"},
+    {"random_walk", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, random_walk),
+     .doc = "suspended grains wander with the eddies that the mesh does not show; random numbers by fluid.seed"},
+    {"schmidt", KEY_NUMBER, .fallback = "1", POSITIVE, AT(silt_grains_def, schmidt),
+     .doc = "eddy viscosity over the diffusivity of that walk"},
     {"list", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &grain_table, MANY(silt_grains_def, n_grain, grain),
      .doc = "grains that are there from the start"},
     {"regions", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &fill_table, MANY(silt_grains_def, n_fill, fill),
@@ -461,8 +476,10 @@ static const silt_key grains_rows[] = {
 TABLE(grains, "the grains block", silt_grains_def, -1);
 
 static const silt_key contact_rows[] = {
-    {"youngs_modulus", KEY_NUMBER, .unit = "Pa", RANGE(5e6, 1e9), AT(silt_contact_def, youngs_modulus),
+    {"youngs_modulus", KEY_NUMBER, .unit = "Pa", RANGE(5e6, 1e12), AT(silt_contact_def, youngs_modulus),
      .doc = "of grains and bodies; soft is fast"},
+    {"wall_modulus", KEY_NUMBER, .unit = "Pa", .fallback = "=contact.youngs_modulus", RANGE(5e6, 1e16), AT(silt_contact_def, wall_modulus),
+     .doc = "Young's modulus of the walls; a thousand times that of the grains is rigid"},
     {"poissons_ratio", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 0.5), AT(silt_contact_def, poissons_ratio),
      .doc = "of grains and bodies"},
     {"restitution", KEY_NUMBER, RANGE(0.05, 1), AT(silt_contact_def, restitution), .doc = "coefficient of restitution"},
@@ -509,7 +526,7 @@ static const silt_key gauge_rows[] = {
     {"velocity_at", KEY_POINT, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_VELOCITY, AT(silt_gauge_def, from),
      .doc = "velocity there, columns NAME_x, NAME_y, NAME_z"},
     {"discharge", KEY_SEGMENT, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_DISCHARGE,
-     AT(silt_gauge_def, from), .doc = "flow through the segment from its left to its right, m2/s"},
+     AT(silt_gauge_def, from), .doc = "flow through the segment from its left to its right, with seepage also that through the bed, m2/s"},
     {"bed_level_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_BED_LEVEL,
      AT(silt_gauge_def, from), .doc = "height of the bed at this x (3-D: [x, y])"},
     {"scour_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_SCOUR,
@@ -522,6 +539,14 @@ static const silt_key gauge_rows[] = {
      .doc = "top of the heap at this x (3-D: [x, y])"},
     {"grains_slope", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_GRAIN_SLOPE, AT(silt_gauge_def, from),
      .doc = "angle in degrees by which the top of the heap falls to the right, by least squares between these two x"},
+    {"grain_place", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_PLACE, AT(silt_gauge_def, index),
+     .doc = "centre of this grain, those of the list from 1, then the regions'; columns NAME_x, NAME_y, NAME_z"},
+    {"grain_velocity", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_VELOCITY,
+     AT(silt_gauge_def, index), .doc = "of this grain, columns NAME_x, NAME_y, NAME_z"},
+    {"grain_spin", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_SPIN, AT(silt_gauge_def, index),
+     .doc = "angular velocity of this grain, rad/s, columns NAME_x, NAME_y, NAME_z"},
+    {"grain_force", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_FORCE, AT(silt_gauge_def, index),
+     .doc = "force of contacts on this grain, mean of the last step, N, columns NAME_x, NAME_y, NAME_z; per metre of width in 2-D"},
     {"force_on", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(0, INT32_MAX), .select = GAUGE_FORCE,
      AT(silt_gauge_def, index),
      .doc = "force of the water on this wall of the list, from 0; columns NAME_x, NAME_y, NAME_z, N"},

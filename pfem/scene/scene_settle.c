@@ -388,6 +388,10 @@ static void settle_sieve(silt_reader *reader, const silt_tree *item, const char 
 }
 
 static void settle_fills(silt_reader *reader, silt_scene *scene) {
+    if (scene->grains.sieve.n_row)
+        settle_sieve(reader, silt_tree_find(reader->root, "grains.sieve"), "grains.sieve", &scene->grains.sieve);
+    if (scene->grains.sieve.n_row && scene->grains.per_patch)
+        silt_complain_key(reader, silt_tree_find(reader->root, "grains.per_patch"), "key 'grains.per_patch': found it beside a sieve, allowed only one of them");
     for (int i = 0; i < scene->grains.n_fill; i++) {
         silt_fill_def *fill = &scene->grains.fill[i];
         const silt_tree *node = silt_tree_find(reader->root, "grains.regions.%d", i);

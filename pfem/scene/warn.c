@@ -47,6 +47,13 @@ static int warn_fluid(const silt_scene *scene, FILE *to) {
 
 int silt_scene_warn(const silt_scene *scene, FILE *to) {
     int count = scene->fluid.on ? warn_fluid(scene, to) : 0;
+    // the pores of such gravel are turbulent, and steps are short against the time that its water takes to move
+    const double g = silt_length(3, scene->gravity), n = scene->bed.porosity;
+    const double k = scene->bed.seepage == SEEPAGE_DARCY ? scene->bed.permeability
+                   : scene->bed.seepage == SEEPAGE_NONE  ? 0
+                                                         : silt_square(scene->grains.diameter) * n * n * n / (180 * silt_square(1 - n));
+    warn_when(scene->bed.on && scene->fluid.on && k * scene->fluid.density * g > scene->fluid.viscosity, scene, to, &count,
+              "the bed's conductivity is above 1 m/s, where Darcy's law does not hold");
     // a body drags its added mass along; for a disc that is the displaced water, for a box of equal sides 1.19 of it
     for (int b = 0; b < scene->n_body && scene->fluid.on; b++) {
         const silt_body_def *body = &scene->body[b];
