@@ -450,7 +450,7 @@ static void test_stiff_drag_on_both_sides(void **unused) {
         OK(silt_exchange_prepare(e, &t.nodes, &t.mesh, dt, &error));
         const silt_step now = {.scene = &scene, .walls = &walls, .mesh = &t.mesh, .drag = &e->drag, .nodes = &t.nodes, .dt = dt};
         OK(silt_fluid_step(&fluid, &now, &error));
-        silt_exchange_load(e, fluid.w, t.nodes.p, dt);
+        silt_exchange_load(e, fluid.w, t.nodes.p, dt, NULL);
         double momentum = 0, worst = 0, left = 0;
         for (int i = 0; i < t.mesh.n_node; i++) {
             const silt_exchange_grain *g = &e->grain[i];
