@@ -118,7 +118,8 @@ silt_status silt_checkpoint_save(silt_coupling *c, silt_store *store, silt_error
     if (status == SILT_OK)
         status = checkpoint_rows_store(&r, true, store, err);
     if (status == SILT_OK && c->n_motion > 0)
-        status = silt_store_put(store, "coupling/wall", STORE_DOUBLE, 3 * (size_t)c->n_motion, c->centre, err);
+        status = silt_store_put(store, "coupling/wall", STORE_DOUBLE, sizeof *c->centre / sizeof(double) * (size_t)c->n_motion, c->centre,
+                                err);
     checkpoint_rows_clear(&r);
     return status;
 }
@@ -132,7 +133,8 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     checkpoint_rows_create(&r);
     silt_status status = checkpoint_rows_store(&r, false, store, err);
     if (status == SILT_OK && c->n_motion > 0)
-        status = silt_store_take(store, "coupling/wall", STORE_DOUBLE, 3 * (size_t)c->n_motion, c->towards, err);
+        status = silt_store_take(store, "coupling/wall", STORE_DOUBLE, sizeof *c->centre / sizeof(double) * (size_t)c->n_motion,
+                                 c->towards, err);
     if (status != SILT_OK)
         goto done;
     silt_coupling_walls_stand(c);

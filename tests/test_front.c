@@ -364,7 +364,8 @@ static void pairs_open(pairs *p, int n, int m, bool (*joined)(const graph *, int
         for (int r = 0; r < m; r++)
             p->whole[m * i + r] = fabsf(own[(m + 1) * r]);
     }
-    p->matrix = (silt_front_matrix){.n = n, .neighbour_start = g->start, .neighbour = g->list, .pair = p->pair, .unknowns = m, .whole = p->whole};
+    p->matrix = (silt_front_matrix){.n = n, .neighbour_start = g->start, .neighbour = g->list, .pair = p->pair, .unknowns = m,
+                                    .whole = p->whole};
 }
 
 static void pairs_close(pairs *p) {
@@ -461,7 +462,9 @@ static void dense(void **state) {
             float panel[70 * 70 + DENSE_PAD] = {0}, update[70 * 70 + DENSE_PAD] = {0}, whole[70 + DENSE_PAD];
             for (int i = 0; i < wide; i++)
                 for (int j = 0; j <= i; j++)
-                    full[i][j] = full[j][i] = i == j ? i >= own - negative && i < own ? -wide : wide : (float)silt_uniform(&seed) - 0.5f;
+                    full[i][j] = full[j][i] = i > j                                ? (float)silt_uniform(&seed) - 0.5f
+                                              : i >= own - negative && i < own ? -wide
+                                                                               : wide;
             for (int i = 0; i < 70; i++)
                 whole[i] = (float)wide;
             for (int j = 0; j < own; j++)

@@ -43,7 +43,8 @@ DENSE_INLINE void product_two(const int sign, int k, size_t ld, const float *a, 
 }
 
 // the same for one vector of rows, of which the first `rows` count, and `columns` columns; what does not count is written as it was
-DENSE_INLINE void product_one(const int sign, int k, size_t ld, const float *a, const float *b, float *out, size_t apart, int rows, int columns) {
+DENSE_INLINE void product_one(const int sign, int k, size_t ld, const float *a, const float *b, float *out, size_t apart, int rows,
+                              int columns) {
     const bits which = lanes_first(rows);
     vector sum[C] = {{0}};
     for (int c = 0; c < k; c++, a += ld, b += ld) {
@@ -58,7 +59,8 @@ DENSE_INLINE void product_one(const int sign, int k, size_t ld, const float *a, 
             *(vector *)(out + (size_t)j * apart) -= lanes_keep(sign < 0 ? sum[j] : -sum[j], which);
 }
 
-DENSE_INLINE void product(const int sign, int k, size_t ld, const float *a, const float *b, float *out, size_t apart, int rows, int columns) {
+DENSE_INLINE void product(const int sign, int k, size_t ld, const float *a, const float *b, float *out, size_t apart, int rows,
+                          int columns) {
     int r = 0;
     for (; r + 2 * LANES <= rows && columns == C; r += 2 * LANES)
         product_two(sign, k, ld, a + r, b, out + r, apart);

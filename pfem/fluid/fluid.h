@@ -241,7 +241,7 @@ silt_status silt_seepage_solve(silt_fluid *fluid, const silt_step *step, const d
 silt_status silt_stiff_factor(silt_stiff **stiff, silt_fluid *fluid, const silt_step *step, bool pressure, silt_error *err);
 /** whether there is such a factor of the present step */
 bool silt_stiff_ready(const silt_stiff *stiff, bool pressure);
-/** the step is over */
+/** the step is over, or factors are of no more use in it */
 void silt_stiff_end(silt_stiff *stiff);
 /** out = (inertia + K)^-1 right on the free components */
 void silt_stiff_momentum(silt_stiff *stiff, const silt_fluid *fluid, const double *right, double *out);

@@ -1,8 +1,9 @@
 /** @file front.h
- * Direct solution of a symmetric positive definite system whose matrix is a sum over the nodes' stars (a node and its neighbours),
- * 2-D: nested dissection by place, then fronts (Duff and Reid, ACM Trans. Math. Softw. 9, 1983). The matrix is never put
- * together: a star goes straight into the front that eliminates the first of its nodes. Single precision: half the memory and twice
- * the numbers at a time of double (factor and solves at 160k nodes 3600 -> 1960 ns a node and step); front_mend.c makes up for it.
+ * Direct solution of a symmetric system whose matrix is a sum over the nodes' stars (a node and its neighbours), positive definite, or
+ * couples pairs of neighbours with two or three unknowns each, quasi-definite; 2-D: nested dissection by place, then fronts (Duff and
+ * Reid, ACM Trans. Math. Softw. 9, 1983). The matrix is never put together: a star or pair goes straight into the front that eliminates
+ * the first of its nodes. Single precision: half the memory and twice the numbers at a time of double (factor and solves of S + L at
+ * 160k nodes 3600 -> 1960 ns a node and step); front_mend.c makes up for it.
  */
 #ifndef SILT_FRONT_H
 #define SILT_FRONT_H

@@ -160,8 +160,9 @@ silt_status silt_stiff_factor(silt_stiff **stiff, silt_fluid *f, const silt_step
         rows_assemble(3, q, b, f, mesh, silt_closed_pieces(f, mesh));
     else
         rows_assemble(2, q, b, f, mesh, NULL);
-    b->matrix = (silt_front_matrix){.n = mesh->n_node, .neighbour_start = mesh->neighbour_start, .neighbour = mesh->neighbour, .pair = b->pair,
-                                    .unknowns = pressure ? 3 : 2, .whole = b->whole, .threads = silt_threads(mesh->n_node)};
+    b->matrix = (silt_front_matrix){.n = mesh->n_node, .neighbour_start = mesh->neighbour_start, .neighbour = mesh->neighbour,
+                                    .pair = b->pair, .unknowns = pressure ? 3 : 2, .whole = b->whole,
+                                    .threads = silt_threads(mesh->n_node)};
     if (b->revision != mesh->revision)
         SILT_CLOCKED(analyse, silt_front_order(&b->front, &b->matrix, s->nodes->x));
     b->revision = mesh->revision;
@@ -171,8 +172,8 @@ silt_status silt_stiff_factor(silt_stiff **stiff, silt_fluid *f, const silt_step
     if (b->ready)
         return SILT_OK;
     b->revision = -1;
-    return silt_fail(err, SILT_FAILED, "the %s matrix of the stiff water could not be factored near (%g, %g)", pressure ? "saddle-point" : "momentum",
-                     s->nodes->x[2 * bad], s->nodes->x[2 * bad + 1]);
+    return silt_fail(err, SILT_FAILED, "the %s matrix of the stiff water could not be factored near (%g, %g)",
+                     pressure ? "saddle-point" : "momentum", s->nodes->x[2 * bad], s->nodes->x[2 * bad + 1]);
 }
 
 void silt_stiff_momentum(silt_stiff *q, const silt_fluid *f, const double *right, double *out) {

@@ -54,7 +54,8 @@ static double speed_apart(const silt_run *run, int i) {
 
 // Time in which a node crosses a cell. What little spray there is costs steps and is worth none. Where it flies together its
 // speed counts no more than it pulls cells apart: while it is thrown out that is all of it, later little. The collapse in
-// space at 10 cells takes 195 steps in place of 297, in the plane at 40 cells 624 in place of 990, and loses no more volume.
+// space at 10 cells takes 195 steps in place of 297, in the plane at 40 cells 624 in place of 990; the volume errors by
+// 0.3 s are 0.10 and 0.04 %, 0.03 and 0.04 before.
 static double crossing_time(const silt_run *run) {
     const silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
