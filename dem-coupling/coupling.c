@@ -303,15 +303,13 @@ static double coupling_body_distance(const silt_coupling *c, int i, const double
 }
 
 static double coupling_wall_distance(const silt_walls *walls, int i, const double x[2]) {
-    const double *a = walls->from[i], *b = walls->to[i];
-    double e[2] = {b[0] - a[0], b[1] - a[1]}, d[2] = {x[0] - a[0], x[1] - a[1]};
-    double t = silt_clamp((e[0] * d[0] + e[1] * d[1]) / (e[0] * e[0] + e[1] * e[1]), 0.0, 1.0);
+    const double *a = walls->from[i], *b = walls->to[i], e[2] = {b[0] - a[0], b[1] - a[1]}, d[2] = {x[0] - a[0], x[1] - a[1]};
+    const double t = silt_clamp((e[0] * d[0] + e[1] * d[1]) / (e[0] * e[0] + e[1] * e[1]), 0.0, 1.0);
     return hypot(d[0] - t * e[0], d[1] - t * e[1]);
 }
 
 static double coupling_apart(const silt_coupling *c, const double *x, const double *y) {
-    const double flat = hypot(x[0] - y[0], x[1] - y[1]);
-    return c->dim == 3 ? hypot(flat, x[2] - y[2]) : flat;
+    return hypot(hypot(x[0] - y[0], x[1] - y[1]), c->dim == 3 ? x[2] - y[2] : 0.0);
 }
 
 // free distance from a point to grains and bodies
@@ -335,9 +333,8 @@ static bool coupling_room(const silt_coupling *c, const double *x, double radius
         if (coupling_apart(c, x, s->x) - s->radius < need)
             return false;
     }
-    int element;
     if (c->dim == 3)
-        return c->walls->count == 0 || silt_walls_distance(c->walls, x, &element) >= need;
+        return c->walls->count == 0 || silt_walls_distance(c->walls, x, &(int){0}) >= need;
     for (int i = 0; i < c->walls->count; i++)
         if (coupling_wall_distance(c->walls, i, x) < need)
             return false;
@@ -451,9 +448,9 @@ static void coupling_exchanged(const silt_coupling *c, silt_exchanged *exchanged
 
 // spheres that LIGGGHTS has not heard of, in rising id: grains and frozen ones merged
 static void coupling_add(silt_coupling *c) {
-    int n = 0, i = 0, k = 0;
     if (c->sent_id == c->next_id)
         return;
+    int n = 0, i = 0, k = 0;
     c->sent_id = c->next_id;
     SILT_RESERVE(c->add, c->add_capacity, c->n_grain + c->frozen.count);
     while (i < c->n_grain || k < c->frozen.count) {
@@ -474,9 +471,9 @@ static void coupling_add(silt_coupling *c) {
             silt_frozen_sphere *f = &c->frozen.sphere[k++];
             if (f->sent)
                 continue;
-            double density = c->scene->bed.on ? c->scene->bed.density : 1000.0;
             c->add[n++] = (silt_dem_sphere){
-                .id = f->id, .kind = DEM_FROZEN, .x = {f->x[0], f->x[1], f->x[2]}, .radius = f->radius, .density = density};
+                .id = f->id, .kind = DEM_FROZEN, .x = {f->x[0], f->x[1], f->x[2]}, .radius = f->radius,
+                .density = c->scene->bed.on ? c->scene->bed.density : 1000.0};
             f->sent = true;
         }
     }
