@@ -254,6 +254,7 @@ typedef struct silt_grains_def {
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false
     bool rotational_drag; // torque on the spin, default false
+    double eddy_limit;    // 0, share of grains at which eddies have no room; 0: grains do not hinder them
     bool random_walk;     // of suspended grains in the eddies, default false
     double schmidt;       // 1, eddy viscosity over the grains' diffusivity
     int n_grain;

@@ -464,6 +464,9 @@ static const silt_key grains_rows[] = {
      .doc = "force of the water's viscous stress on the grain's volume"},
     {"rotational_drag", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, rotational_drag),
      .doc = "torque of the water on grains that spin otherwise than it does"},
+    {"eddy_limit", KEY_NUMBER, .fallback = "0", .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_grains_def, eddy_limit),
+     .doc = "share of grains in the water at which eddies have no room: the mixing length counts the way to the wall times 1 - share/limit "
+            "(Li and Sawamoto 1995; 0.6); 0: grains do not hinder eddies"},
     {"random_walk", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, random_walk),
      .doc = "suspended grains wander with the eddies that the mesh does not show; random numbers by fluid.seed"},
     {"schmidt", KEY_NUMBER, .fallback = "1", POSITIVE, AT(silt_grains_def, schmidt),
