@@ -47,6 +47,9 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         !silt_tree_item(fluid, "cloud"))
         silt_complain_key(reader, fluid,
                           "key 'fluid.regions': found neither regions nor inlets, allowed at least one: there is no water");
+    if (scene->grains.kernel_layers && !(scene->period[0] < scene->period[1]))
+        silt_complain(reader, silt_tree_item(grains, "kernel_layers"),
+                      "key 'grains.kernel_layers': found true, allowed in a periodic scene: its means are taken along the whole of x");
     const silt_tree *regions = silt_tree_item(bed, "regions");
     if (regions && regions->kind == TREE_LIST && regions->n_item == 0)
         silt_complain(reader, regions, "key 'bed.regions': found an empty list, allowed at least one region");
