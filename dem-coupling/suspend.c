@@ -187,7 +187,8 @@ void silt_coupling_walk(silt_coupling *c, const silt_nodes *nodes, const silt_me
     for (int i = 0; i < c->n_grain && i < c->n_loaded; i++) {
         coupling_grain *p = &c->grain[i];
         const silt_exchange_grain *e = &c->exchange.grain[i];
-        if (p->gone || p->fixed || e->cell < 0 || silt_length(c->dim, p->contact) > touching * p->mass * g)
+        const bool rests = silt_length(c->dim, p->contact) > touching * p->mass * g;
+        if (p->gone || p->fixed || e->cell < 0 || (rests && !scene->grains.pick_up))
             continue;
         uint64_t random = silt_hash(0, &scene->fluid.seed, sizeof scene->fluid.seed);
         random = silt_hash(silt_hash(random, &step, sizeof step), &p->id, sizeof p->id);
