@@ -675,8 +675,9 @@ static void check_layers(silt_reader *reader, const silt_scene *scene, int i, co
     static const char *const own[] = {"since", "layer", "unit_at"};
     const silt_check_def *check = &scene->check[i];
     const bool grains = check->kind == CHECK_PROFILE && check->profile == PROFILE_GRAINS;
+    const bool given[] = {!isnan(check->since), check->layer != 0, !isnan(check->unit_at)};
     for (int k = 0; k < 3 && check->kind == CHECK_PROFILE && !grains; k++)
-        if (silt_tree_item(node, own[k]))
+        if (given[k])
             silt_complain_key(reader, silt_tree_item(node, own[k]),
                               "key 'checks.%d.%s': found it with another profile, allowed only with profile: grains", i, own[k]);
     if (!grains)
