@@ -68,6 +68,7 @@ typedef struct silt_inlet {
     double *corner;      // owned, 3 per point
     double velocity[3];  // m/s; multiplied by column 1 of the series when there is one
     silt_series series;  // n_row 0: constant; in the scene the name of a CSV file
+    double grains;       // kg/s, 2-D per metre of width: sediment that comes in with the water; multiplied by the series too
     silt_series head;    // level over time (time, level), m, of still water behind it; n_row 0: velocity-driven
 } silt_inlet;
 

@@ -171,6 +171,9 @@ static const silt_key inlet_rows[] = {
             "in with: a number, or a CSV file beside the scene with time in s, level in m"},
     {"series", KEY_SERIES, .flags = KEY_OPTIONAL, .when = ONLY(INLET_VELOCITY), AT(silt_inlet, series),
      .doc = "CSV file beside the scene: time in s, factor on the velocity"},
+    {"grains", KEY_NUMBER, .unit = "kg/s", .fallback = "0", NOT_NEGATIVE, .when = ONLY(INLET_VELOCITY), AT(silt_inlet, grains),
+     .doc = "sediment that comes in with the water (2-D: kg/s per m of width), times the factor of `series`: parcels of grains.parcel "
+            "with bed.density, at random places of the inlet; needs a bed"},
     {0}};
 TABLE(inlet, "an inlet", silt_inlet, offsetof(silt_inlet, drive));
 
