@@ -34,22 +34,30 @@ static void box_span(double lo[3], double hi[3], const double *x, int dim, doubl
     }
 }
 
+static void box_walls(const silt_run *run, double lo[3], double hi[3]) {
+    for (int s = 0; s < run->walls.count; s++)
+        if (run->scene->dimension == 3)
+            for (int c = 0; c < 3; c++)
+                box_span(lo, hi, run->walls.corner[s][c], 3, 0);
+        else {
+            box_span(lo, hi, run->walls.from[s], 2, 0);
+            box_span(lo, hi, run->walls.to[s], 2, 0);
+        }
+}
+
 // Where walls come in the course of their motion, from row to row, with places between for those that turn: the discrete elements
 // lose what leaves the box.
 static void box_motion(silt_run *run, double lo[3], double hi[3]) {
     enum { BETWEEN = 16 };
     const silt_scene *scene = run->scene;
-    for (int w = 0; w < scene->n_wall && scene->dimension != 3; w++) {
+    for (int w = 0; w < scene->n_wall; w++) {
         const silt_series *motion = &scene->wall[w].motion;
         for (int r = 0; r < BETWEEN * motion->n_row; r++) {
             const double *row = motion->value + (size_t)(r / BETWEEN) * (size_t)motion->n_column;
             const double next = r / BETWEEN + 1 < motion->n_row ? row[motion->n_column] : row[0];
             const double time = row[0] + (double)(r % BETWEEN) / BETWEEN * (next - row[0]);
             silt_walls_move(&run->walls, scene, silt_min(time, scene->time.end), 0);
-            for (int s = 0; s < run->walls.count; s++) {
-                box_span(lo, hi, run->walls.from[s], 2, 0);
-                box_span(lo, hi, run->walls.to[s], 2, 0);
-            }
+            box_walls(run, lo, hi);
         }
     }
     silt_walls_move(&run->walls, scene, 0, 0);
@@ -59,14 +67,7 @@ void silt_run_box(silt_run *run) {
     const silt_scene *scene = run->scene;
     const int D = scene->dimension == 3 ? 3 : 2;
     double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-    for (int s = 0; s < run->walls.count; s++)
-        if (D == 3)
-            for (int c = 0; c < 3; c++)
-                box_span(lo, hi, run->walls.corner[s][c], D, 0);
-        else {
-            box_span(lo, hi, run->walls.from[s], D, 0);
-            box_span(lo, hi, run->walls.to[s], D, 0);
-        }
+    box_walls(run, lo, hi);
     const silt_region *lists[2] = {scene->fluid.region, scene->bed.region};
     const int counts[2] = {scene->fluid.n_region, scene->bed.n_region};
     for (int l = 0; l < 2; l++)
