@@ -16,10 +16,9 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     if (scene->dimension == 3) {
         // the others were refused already
         bodies = NULL;
-        if (!fluid)
-            silt_complain(
-                reader, root,
-                "key 'fluid': found no water, allowed a scene with fluid: in three dimensions grains come with water so far");
+        if (!fluid && !grains)
+            silt_complain(reader, root,
+                          "key 'fluid': found neither water nor grains, allowed a scene with at least one of fluid, grains");
     } else if (!fluid && !grains && !has_bodies && !bodies)
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "

@@ -549,7 +549,7 @@ static const silt_key gauge_rows[] = {
      .doc = "foremost x to this side of the heap: the grains that hang together, the most mass of them"},
     {"grains_height_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_GRAIN_HEIGHT, AT(silt_gauge_def, from),
      .doc = "top of the heap at this x (3-D: [x, y])"},
-    {"grains_slope", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_GRAIN_SLOPE, AT(silt_gauge_def, from),
+    {"grains_slope", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_GRAIN_SLOPE, AT(silt_gauge_def, from),
      .doc = "angle in degrees by which the top of the heap falls to the right, by least squares between these two x"},
     {"grain_place", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_PLACE, AT(silt_gauge_def, index),
      .doc = "centre of this grain, those of the list from 1, then the regions'; columns NAME_x, NAME_y, NAME_z"},
