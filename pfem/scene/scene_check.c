@@ -16,8 +16,6 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     if (scene->dimension == 3) {
         // the others were refused already
         bodies = NULL;
-        if (bed && grains)
-            silt_complain_key(reader, bed, "key 'bed': found it with grains, allowed without them in three dimensions so far (work: .inf)");
         if (!fluid)
             silt_complain(
                 reader, root,
