@@ -43,7 +43,7 @@ static void checkpoint_body_row(bool out, double *row, struct silt_body *b) {
 /** the arrays of a checkpoint; owned */
 typedef struct checkpoint_rows {
     int64_t number[5]; // grains, frozen spheres, bodies, next id, grains that left
-    double left[2];
+    double left[3];
     int64_t *grain_id, *frozen_id;
     int *frozen_node;
     double *grain, *frozen, *body;
@@ -76,7 +76,7 @@ static silt_status checkpoint_rows_store(checkpoint_rows *r, bool out, silt_stor
         size_t n;
         void *data;
     } array[] = {
-        {"coupling/left", STORE_DOUBLE, 2, r->left},
+        {"coupling/left", STORE_DOUBLE, 3, r->left},
         {"coupling/grain_id", STORE_LONG, grains, r->grain_id},
         {"coupling/grain", STORE_DOUBLE, grains * GRAIN_DOUBLES, r->grain},
         {"coupling/frozen_id", STORE_LONG, frozen, r->frozen_id},
@@ -111,14 +111,15 @@ static void checkpoint_rows_fill(checkpoint_rows *r, bool out, silt_coupling *c)
 
 silt_status silt_checkpoint_save(silt_coupling *c, silt_store *store, silt_error *err) {
     checkpoint_rows r = {.number = {c->n_grain, c->frozen.count, c->bodies->count, c->next_id, c->left_count},
-                         .left = {c->left_mass, c->left_rest}};
+                         .left = {c->left_mass, c->left_rest, c->left_solid}};
     checkpoint_rows_create(&r);
     checkpoint_rows_fill(&r, true, c);
     silt_status status = silt_store_put(store, "coupling/number", STORE_LONG, 5, r.number, err);
     if (status == SILT_OK)
         status = checkpoint_rows_store(&r, true, store, err);
     if (status == SILT_OK && c->n_motion > 0)
-        status = silt_store_put(store, "coupling/wall", STORE_DOUBLE, 3 * (size_t)c->n_motion, c->centre, err);
+        status = silt_store_put(store, "coupling/wall", STORE_DOUBLE, sizeof *c->centre / sizeof(double) * (size_t)c->n_motion, c->centre,
+                                err);
     checkpoint_rows_clear(&r);
     return status;
 }
@@ -132,7 +133,8 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     checkpoint_rows_create(&r);
     silt_status status = checkpoint_rows_store(&r, false, store, err);
     if (status == SILT_OK && c->n_motion > 0)
-        status = silt_store_take(store, "coupling/wall", STORE_DOUBLE, 3 * (size_t)c->n_motion, c->towards, err);
+        status = silt_store_take(store, "coupling/wall", STORE_DOUBLE, sizeof *c->centre / sizeof(double) * (size_t)c->n_motion,
+                                 c->towards, err);
     if (status != SILT_OK)
         goto done;
     silt_coupling_walls_stand(c);
@@ -141,6 +143,7 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     c->left_count = r.number[4];
     c->left_mass = r.left[0];
     c->left_rest = r.left[1];
+    c->left_solid = r.left[2];
     c->n_grain = (int)r.number[0];
     c->n_last = 0;
     c->sent_id = r.number[3];

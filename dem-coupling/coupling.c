@@ -137,6 +137,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     c->exchange.force.def = (silt_force_def){grains->added_mass, scene->fluid.theta, grains->viscous_force,
                                              grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     memcpy(c->exchange.gravity, scene->gravity, sizeof c->exchange.gravity);
+    c->exchange.layers = grains->kernel_layers;
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
     const bool space = c->dim == 3, periodic = scene->period[0] < scene->period[1];
@@ -147,6 +148,8 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .dim = c->dim,
         .lo = {periodic ? scene->period[0] : def->lo[0], def->lo[1], def->lo[2]},
         .hi = {periodic ? scene->period[1] : def->hi[0], def->hi[1], def->hi[2]},
+        .way_lo = {def->way_lo[0], def->way_lo[1], def->way_lo[2]},
+        .way_hi = {def->way_hi[0], def->way_hi[1], def->way_hi[2]},
         .periodic = periodic,
         .period = period_share * 2.0 * largest,
         .gravity = {scene->gravity[0], scene->gravity[1], scene->gravity[2]},
@@ -303,15 +306,13 @@ static double coupling_body_distance(const silt_coupling *c, int i, const double
 }
 
 static double coupling_wall_distance(const silt_walls *walls, int i, const double x[2]) {
-    const double *a = walls->from[i], *b = walls->to[i];
-    double e[2] = {b[0] - a[0], b[1] - a[1]}, d[2] = {x[0] - a[0], x[1] - a[1]};
-    double t = silt_clamp((e[0] * d[0] + e[1] * d[1]) / (e[0] * e[0] + e[1] * e[1]), 0.0, 1.0);
+    const double *a = walls->from[i], *b = walls->to[i], e[2] = {b[0] - a[0], b[1] - a[1]}, d[2] = {x[0] - a[0], x[1] - a[1]};
+    const double t = silt_clamp((e[0] * d[0] + e[1] * d[1]) / (e[0] * e[0] + e[1] * e[1]), 0.0, 1.0);
     return hypot(d[0] - t * e[0], d[1] - t * e[1]);
 }
 
 static double coupling_apart(const silt_coupling *c, const double *x, const double *y) {
-    const double flat = hypot(x[0] - y[0], x[1] - y[1]);
-    return c->dim == 3 ? hypot(flat, x[2] - y[2]) : flat;
+    return hypot(hypot(x[0] - y[0], x[1] - y[1]), c->dim == 3 ? x[2] - y[2] : 0.0);
 }
 
 // free distance from a point to grains and bodies
@@ -335,9 +336,8 @@ static bool coupling_room(const silt_coupling *c, const double *x, double radius
         if (coupling_apart(c, x, s->x) - s->radius < need)
             return false;
     }
-    int element;
     if (c->dim == 3)
-        return c->walls->count == 0 || silt_walls_distance(c->walls, x, &element) >= need;
+        return c->walls->count == 0 || silt_walls_distance(c->walls, x, &(int){0}) >= need;
     for (int i = 0; i < c->walls->count; i++)
         if (coupling_wall_distance(c->walls, i, x) < need)
             return false;
@@ -451,9 +451,9 @@ static void coupling_exchanged(const silt_coupling *c, silt_exchanged *exchanged
 
 // spheres that LIGGGHTS has not heard of, in rising id: grains and frozen ones merged
 static void coupling_add(silt_coupling *c) {
-    int n = 0, i = 0, k = 0;
     if (c->sent_id == c->next_id)
         return;
+    int n = 0, i = 0, k = 0;
     c->sent_id = c->next_id;
     SILT_RESERVE(c->add, c->add_capacity, c->n_grain + c->frozen.count);
     while (i < c->n_grain || k < c->frozen.count) {
@@ -474,9 +474,9 @@ static void coupling_add(silt_coupling *c) {
             silt_frozen_sphere *f = &c->frozen.sphere[k++];
             if (f->sent)
                 continue;
-            double density = c->scene->bed.on ? c->scene->bed.density : 1000.0;
             c->add[n++] = (silt_dem_sphere){
-                .id = f->id, .kind = DEM_FROZEN, .x = {f->x[0], f->x[1], f->x[2]}, .radius = f->radius, .density = density};
+                .id = f->id, .kind = DEM_FROZEN, .x = {f->x[0], f->x[1], f->x[2]}, .radius = f->radius,
+                .density = c->scene->bed.on ? c->scene->bed.density : 1000.0};
             f->sent = true;
         }
     }
@@ -525,6 +525,9 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
 
 static void coupling_leave(silt_coupling *c, coupling_grain *g) {
     silt_sum(&c->left_mass, &c->left_rest, g->mass);
+    const int i = (int)(g - c->grain);
+    if (i < c->n_loaded && c->exchange.grain[i].cell >= 0)
+        c->left_solid += c->exchange.grain[i].immersed;
     c->left_count++;
     coupling_take(c, g);
 }
@@ -547,21 +550,13 @@ static void coupling_receive(silt_coupling *c, coupling_grain *g, const silt_dem
     g->net = silt_length(c->dim, net);
 }
 
-// a grain that LIGGGHTS no longer has: over an outlet, or lost
-static bool coupling_left_domain(const silt_coupling *c, const coupling_grain *g) {
-    double ahead[3];
-    for (int d = 0; d < 3; d++)
-        ahead[d] = g->old_x[d] + 2.0 * c->elapsed * g->v[d];
-    return silt_coupling_leaves(c, g->old_x, ahead, 4.0 * g->radius);
-}
-
 // nothing is changed before it is sure that no grain is lost
 static silt_status coupling_complete(const silt_coupling *c, const silt_dem_state *state, silt_error *err) {
     for (int i = 0, k = 0; i < c->n_grain && state->n_grain != c->n_grain; i++) {
         const coupling_grain *g = &c->grain[i];
         while (k < state->n_grain && state->id[k] < g->id)
             k++;
-        if (!g->fixed && (k == state->n_grain || state->id[k] != g->id) && !coupling_left_domain(c, g))
+        if (!g->fixed && (k == state->n_grain || state->id[k] != g->id) && !silt_coupling_left_domain(c, g))
             return silt_fail(
                 err, SILT_FAILED,
                 "grain %lld vanished: last seen at (%g, %g) with the velocity (%g, %g) m/s and the radius %g m; it "
@@ -732,24 +727,19 @@ static void coupling_close(silt_coupling **coupling) {
 
 // ---------------------------------------------------------------- small answers
 
-static double coupling_step(const silt_coupling *c) {
-    return c->step;
-}
+static double coupling_step(const silt_coupling *c) { return c->step; }
 
-static silt_body_state *coupling_bodies(const silt_coupling *c) {
-    return c->bodies;
-}
+static silt_body_state *coupling_bodies(const silt_coupling *c) { return c->bodies; }
 
-static int coupling_process(const silt_coupling *c) {
-    return silt_dem_process(c->dem);
-}
+static int coupling_process(const silt_coupling *c) { return silt_dem_process(c->dem); }
 
 static int coupling_outline(const silt_coupling *c, int body, double h, double *point, int capacity) {
     return silt_outline_nodes(&c->body[body].shape, h, point, capacity);
 }
 
-static void coupling_left(const silt_coupling *c, double *mass, int64_t *count) {
+static void coupling_left(const silt_coupling *c, double *mass, double *solid, int64_t *count) {
     *mass = c->left_mass;
+    *solid = c->left_solid;
     *count = c->left_count;
 }
 

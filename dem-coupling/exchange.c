@@ -3,6 +3,7 @@
 
 #include "vector.h"
 
+static const double exchange_negative = 0.1; // of a node's inertia: negative drag that is taken as a push
 static const double kernel_reach = 6.0; // kernel widths in the plane; the kernel falls off with exp(-2 r/width)
 static const double sweep_reach = 3.0;  // in space, where it falls off with exp(-(r/width)^2)
 static const double solid_bound = 0.9;  // largest solid fraction in space
@@ -332,8 +333,9 @@ static bool exchange_seen(silt_exchange *e, const double *velocity, const double
     return memcmp(before, e->seen, (size_t)((e->dim + 1) * e->n_look) * sizeof *before) == 0;
 }
 
-// what the nodes get of the smoothed fields
-static void exchange_take(silt_exchange *e) {
+// What the nodes get of the smoothed fields. In space the kernel is not positive: beside much heavier ones a node of a thin film may get
+// less drag than none, and inertia below none with it. Such drag is a push at the iterate's velocity, the same at the last iterate.
+static void exchange_take(silt_exchange *e, const double *velocity, double dt) {
     const int D = e->dim;
     for (int m = 0; m < e->kernel.n_node; m++) {
         const int i = e->kernel.node[m];
@@ -341,6 +343,11 @@ static void exchange_take(silt_exchange *e) {
         e->coefficient[i] = e->volume[m] * row[GIVE_DRAG];
         for (int k = 0; k < D; k++)
             e->push[D * i + k] = e->volume[m] * row[GIVE_PUSH(k)];
+        if (D == 3 && e->coefficient[i] * dt < -exchange_negative * e->density * e->volume[m]) {
+            for (int k = 0; k < D; k++)
+                e->push[D * i + k] -= e->coefficient[i] * velocity[D * i + k];
+            e->coefficient[i] = 0.0;
+        }
     }
 }
 
@@ -361,7 +368,7 @@ static void exchange_update(void *self, const double *velocity, const double *pr
     memset(e->give, 0, GIVE_FIELDS * ((size_t)e->n_look + 1) * sizeof *e->give);
     exchange_give(e, e->refresh || fresh);
     silt_kernel_solve(&e->kernel, GIVE_FIELDS, e->give);
-    exchange_take(e);
+    exchange_take(e, velocity, dt);
     if (e->force.def.spin)
         silt_force_couple(e);
     exchange_source(e);
@@ -466,7 +473,9 @@ static void exchange_choose_along(silt_exchange *e, double reach) {
 
 static void exchange_choose(silt_exchange *e) {
     exchange_mark(e);
-    if (e->n_wet > 0 && (e->dim == 3 || e->mesh->period[0] > 0.0))
+    if (e->n_wet > 0 && e->layers)
+        memcpy(e->chosen, e->mesh->wet, (size_t)e->mesh->n_node);
+    else if (e->n_wet > 0 && (e->dim == 3 || e->mesh->period[0] > 0.0))
         exchange_choose_along(e, (e->dim == 3 ? sweep_reach : kernel_reach) * e->width);
     else if (e->n_wet > 0)
         exchange_choose_plane(e);
@@ -558,7 +567,7 @@ silt_status silt_exchange_place(silt_exchange *e, const silt_nodes *nodes, const
     SILT_RESERVE(e->index, e->node_capacity[8], n);
     SILT_RESERVE(e->placed_x, e->node_capacity[7], D * n);
     exchange_choose(e);
-    SILT_TRY(silt_kernel_build(&e->kernel, mesh, nodes->x, e->chosen, e->width, err));
+    SILT_TRY(silt_kernel_build(&e->kernel, mesh, nodes->x, e->chosen, e->width, e->layers, err));
     exchange_look(e);
     SILT_RESERVE(e->read, e->node_capacity[4], READ_FIELDS(D) * (e->n_look + 1));
     SILT_RESERVE(e->give, e->node_capacity[5], GIVE_FIELDS * (e->n_look + 1));

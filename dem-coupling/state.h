@@ -94,6 +94,7 @@ struct silt_coupling {
     double elapsed;       // s, of the running substeps
     double contact[3];    // N/m, of contacts on all grains, of the last substeps
     double left_mass, left_rest; // and what rounding left out of it (silt_sum)
+    double left_solid;           // m3/m, water that the grains that crossed an outlet displaced there
     int64_t left_count;
     silt_error refused; // why a release cannot be; returned by the next start
 };
@@ -122,6 +123,8 @@ void silt_coupling_shift(silt_coupling *coupling);
 void silt_coupling_twist(silt_coupling *coupling);
 /** true when the way from a to b leads over an outlet out of the water, or a is within `near` of one */
 bool silt_coupling_leaves(const silt_coupling *coupling, const double *a, const double *b, double near);
+/** a grain that LIGGGHTS no longer has: true when it went over an outlet; it is lost otherwise */
+bool silt_coupling_left_domain(const silt_coupling *coupling, const coupling_grain *grain);
 // walls.c
 void silt_coupling_walls(silt_coupling *coupling);       /**< which of them move, and where all are */
 void silt_coupling_walls_stand(silt_coupling *coupling); /**< where the walls are now is where LIGGGHTS has them */

@@ -43,3 +43,10 @@ bool silt_coupling_leaves(const silt_coupling *c, const double *a, const double 
     }
     return false;
 }
+
+bool silt_coupling_left_domain(const silt_coupling *c, const coupling_grain *g) {
+    double ahead[3];
+    for (int d = 0; d < 3; d++)
+        ahead[d] = g->old_x[d] + 2.0 * c->elapsed * g->v[d];
+    return silt_coupling_leaves(c, g->old_x, ahead, 4.0 * g->radius);
+}

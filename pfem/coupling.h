@@ -16,6 +16,7 @@ typedef struct silt_coupling_def {
     const char *worker;      // path of silt-dem
     const char *log;         // OUT/dem.log
     double lo[3], hi[3];     // the domain's box (with margin): what leaves it has left
+    double way_lo[3], way_hi[3]; // m, what walls with a motion span from the start to the end
 } silt_coupling_def;
 
 /** what passed between grains, water and the rest in a step: N per m of width, mean over the step */
@@ -70,8 +71,9 @@ typedef struct silt_coupling_type {
     /** After a finish that failed, before the next prepare: new discrete elements with grains and bodies as they were at the start;
      * contacts forget their tangential springs. @return SILT_FAILED when they were ended from outside: that is no fault of the step */
     silt_status (*recover)(silt_coupling *coupling, silt_error *err);
-    /** sediment that crossed an outlet of the scene from left to right since the start: kg per m of width, grains */
-    void (*left)(const silt_coupling *coupling, double *mass, int64_t *count);
+    /** sediment that crossed an outlet of the scene out of the water since the start: kg per m of width, m3 of water that it
+     * displaced there, grains */
+    void (*left)(const silt_coupling *coupling, double *mass, double *solid, int64_t *count);
     silt_status (*save)(silt_coupling *coupling, silt_store *store, silt_error *err);
     silt_status (*load_state)(silt_coupling **coupling, const silt_coupling_def *def, silt_store *store, silt_error *err);
     int (*process)(const silt_coupling *coupling);

@@ -417,6 +417,7 @@ typedef struct silt_ledger {
     double released_rest, deposited_rest, fed_rest; // kg, what rounding left out of the three (silt_sum)
     double bed_shear, bed_work, bed_y_plus;       // Pa, J/m3, largest on the bed's surface; see bed.y_plus
     double initial_sediment;
+    double left_solid; // m3, water that the grains that left displaced, cumulative
     int grain_count;
     double grain_mass, sediment_error;
     double grain_velocity[3];                     // m/s, mean by mass

@@ -232,21 +232,17 @@ static void unknowns_expand(silt_front *f, int n_node, int m) {
     free(row);
 }
 
-// where panels stand, the work of subtrees. @return numbers in all panels
-static size_t panels_place(silt_front *f) {
-    size_t value = 0;
+// the work of subtrees, the widest front
+static void work_count(silt_front *f) {
     f->widest = 0;
     for (int e = 0; e < f->n_block; e++) {
         struct block *b = &f->block[e];
         const int own = b->end - b->begin, count = b->row_end - b->row_begin;
-        b->value = value;
-        value += (size_t)own * (size_t)(own + count);
         f->widest = own + count > f->widest ? own + count : f->widest;
         b->work = (double)own * ((double)own * ((double)own / 3 + count) + (double)count * count);
         for (int c = 0, child = e - 1; c < b->n_child; c++, child = f->block[child].first - 1)
             b->work += f->block[child].work;
     }
-    return value;
 }
 
 // ---------------------------------------------------------------- branches
@@ -320,6 +316,21 @@ static void branches_find(silt_front *f) {
         branch_stacks(f, &f->branch[k], f->worker->waiting);
 }
 
+// Where panels stand. Whole vectors are written back over a panel's end, what does not count as it was: behind a branch there is
+// room for that, or it would undo what another thread does to the panel that comes next. @return numbers in all panels
+static size_t panels_place(silt_front *f) {
+    size_t value = 0;
+    for (int k = 0; k < f->n_branch; k++) {
+        for (int e = f->branch[k].begin; e < f->branch[k].end; e++) {
+            struct block *b = &f->block[e];
+            b->value = value;
+            value += (size_t)(b->end - b->begin) * (size_t)(b->end - b->begin + b->row_end - b->row_begin);
+        }
+        value += DENSE_PAD;
+    }
+    return value;
+}
+
 void silt_front_order(silt_front **front, const silt_front_matrix *q, const double *x) {
     if (!*front)
         *front = silt_alloc(1, sizeof **front);
@@ -358,7 +369,7 @@ void silt_front_order(silt_front **front, const silt_front_matrix *q, const doub
     rows_find(f, q);
     if (unknowns > 1)
         unknowns_expand(f, n, unknowns);
-    const size_t value = panels_place(f);
-    f->value = silt_room(f->value, &f->value_capacity, value + DENSE_PAD, sizeof(float));
+    work_count(f);
     branches_find(f);
+    f->value = silt_room(f->value, &f->value_capacity, panels_place(f) + DENSE_PAD, sizeof(float));
 }

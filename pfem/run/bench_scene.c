@@ -16,6 +16,9 @@ static const bench_scene bench_scenes[] = {
     {"grains-1k", "still water with a thousand grains that fall in it", 2, false, 1000, "10k,40k"},
     {"grains-10k", "ten thousand grains", 2, false, 10000, "10k,40k"},
     {"grains-100k", "a hundred thousand grains", 2, false, 100000, "40k"},
+    {"grains-1k-3d", "a thousand grains in space", 3, false, 1000, "10k"},
+    {"grains-10k-3d", "ten thousand grains in space", 3, false, 10000, "10k,40k"},
+    {"grains-100k-3d", "a hundred thousand grains in space", 3, false, 100000, "40k"},
     {"collapse-2d", "a column N nodes wide to 0.5 s, as other codes ran it; sizes are N", 2, true, 0, "20,40,80"},
     {"collapse-3d", "the same in space", 3, true, 0, "10,20"},
 };
@@ -47,8 +50,8 @@ static double spacing(int dimension, double n) {
     return h;
 }
 
-// grains that take a third of the square when they begin to fall
-static double grain_diameter(int n) { return 0.9 * sqrt(0.33 / n); }
+// grains that take a third of the square (a tenth of the cube) when they begin to fall
+static double grain_diameter(int dimension, int n) { return dimension == 3 ? 0.9 * cbrt(0.1 / n) : 0.9 * sqrt(0.33 / n); }
 
 static void text_contact(FILE *to, double parcel) {
     fprintf(to, "grains: {parcel: %.9g}\ncontact: {youngs_modulus: 5.0e+6, poissons_ratio: 0.3, restitution: 0.3, friction: 0.5, rolling_friction: 0.1}\n",
@@ -78,7 +81,7 @@ static void text_column(FILE *to, const bench_scene *kind, double h) {
     // stiff: steps of 0.25 s/m h
     double step = stiff ? 0.25 * h : 0;
     if (kind->n_grain)
-        step = 0.19 * grain_diameter(kind->n_grain); // s/m: about 20 steps of the grains
+        step = 0.19 * grain_diameter(kind->dimension, kind->n_grain); // s/m: about 20 steps of the grains
     fprintf(to, "silt: 1\ndimension: %d\ntime: {end: 1000, output: 1000, step: %.9g}\ngravity: [0, %s-9.81]\nfluid:\n", kind->dimension,
             step, space ? "0, " : "");
     fprintf(to, "  density: 1000\n  viscosity: %.9g\n  size: %.9g\n  flow: %s\n", stiff ? 1000 * 1000 * h * h / step : 1e-3, h,
@@ -101,14 +104,16 @@ static void text_column(FILE *to, const bench_scene *kind, double h) {
 
 // a lattice of grains with gaps, from the floor up
 static void grains_place(silt_scene *scene, int n) {
-    const double d = grain_diameter(n), gap = 1.1 * d;
-    const int row = (int)floor((1 - 0.2 * d) / gap);
+    const bool space = scene->dimension == 3;
+    const double d = grain_diameter(scene->dimension, n), gap = 1.1 * d;
+    const int row = (int)floor((1 - 0.2 * d) / gap), layer = space ? row * row : row;
     free(scene->grains.grain);
     scene->grains.grain = silt_alloc((size_t)n, sizeof *scene->grains.grain);
     scene->grains.n_grain = n;
-    for (int k = 0; k < n; k++)
-        scene->grains.grain[k] = (silt_grain_def){.at = {gap * (k % row + 0.55), gap * (floor(k / (double)row) + 0.55)},
-                                                  .diameter = d, .density = GRAIN_DENSITY};
+    for (int k = 0; k < n; k++) {
+        const double along = gap * (k % row + 0.55), across = gap * (k % layer / row + 0.55), up = gap * (k / layer + 0.55);
+        scene->grains.grain[k] = (silt_grain_def){.at = {along, space ? across : up, space ? up : 0}, .diameter = d, .density = GRAIN_DENSITY};
+    }
 }
 
 silt_status bench_scene_make(silt_scene **scene, const bench_scene *kind, double size, const char *folder, int n_set,

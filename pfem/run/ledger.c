@@ -126,11 +126,13 @@ void silt_run_ledger(silt_run *run) {
             ledger->grain_mass = sum;
         }
         int64_t count;
-        const double left = ledger->left_mass;
-        silt_coupling_dem.left(run->coupling, &ledger->left_mass, &count);
+        const double left = ledger->left_mass, displaced = ledger->left_solid;
+        silt_coupling_dem.left(run->coupling, &ledger->left_mass, &ledger->left_solid, &count);
         // what left the mesh was water and what it carried
         if (scene->bed.on)
             ledger->outflow_mass -= rho * (ledger->left_mass - left) / scene->bed.density;
+        else if (scene->fluid.on)
+            ledger->outflow_mass -= rho * (ledger->left_solid - displaced);
     }
     if (run->step == 0) {
         ledger->initial_volume = ledger->fluid_volume;
