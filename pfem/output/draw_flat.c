@@ -89,7 +89,8 @@ void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, i
     if (wall_lo[0] <= wall_hi[0] && lo[0] <= hi[0]) {
         double room = 0.25 * (hi[1] - lo[1]);
         lo[0] = wall_lo[0], hi[0] = wall_hi[0], lo[1] = silt_min(wall_lo[1], lo[1]);
-        hi[1] = silt_min(wall_hi[1] > lo[1] ? wall_hi[1] : HUGE_VAL, hi[1] + room);
+        // a floor alone bounds nothing from above; grains that lie on it reach into it
+        hi[1] = silt_min(wall_hi[1] > lo[1] + 0.04 * room ? wall_hi[1] : HUGE_VAL, hi[1] + room);
     }
     if (!(lo[0] <= hi[0]))
         lo[0] = lo[1] = 0, hi[0] = hi[1] = 1;
