@@ -105,8 +105,8 @@ static void suspend_grid_open(suspend_grid *grid, const silt_coupling *c) {
         suspend_link(grid, i, c->grain[i].x);
 }
 
-// grain i would touch none at x; those that have walked already stand where they went
-static bool suspend_room(const suspend_grid *grid, const silt_coupling *c, int i, const double *x) {
+// grain i would touch none at x, or at an image of it; those that have walked already stand where they went
+static bool suspend_clear(const suspend_grid *grid, const silt_coupling *c, int i, const double *x) {
     int from[2], to[2];
     for (int d = 0; d < 2; d++) {
         from[d] = suspend_place(grid, d, x[d] - grid->size);
@@ -121,6 +121,21 @@ static bool suspend_room(const suspend_grid *grid, const silt_coupling *c, int i
                 if (k != i && square < silt_square(c->grain[k].radius + c->grain[i].radius))
                     return false;
             }
+    return true;
+}
+
+static double suspend_period(const silt_coupling *c) {
+    return silt_max(c->scene->period[1] - c->scene->period[0], 0.0);
+}
+
+// the same across the ends of a period
+static bool suspend_room(const suspend_grid *grid, const silt_coupling *c, int i, const double *x) {
+    const double period = suspend_period(c);
+    for (int image = period > 0.0 ? -1 : 0; image <= (period > 0.0 ? 1 : 0); image++) {
+        const double at[3] = {x[0] + image * period, x[1], x[2]};
+        if (!suspend_clear(grid, c, i, at))
+            return false;
+    }
     return true;
 }
 
@@ -145,7 +160,10 @@ static bool suspend_step(silt_coupling *c, const silt_nodes *nodes, const silt_m
         to[d] = g->x[d] + slope[d] * dt + sqrt(2.0 * eddy * dt) * suspend_normal(&random);
     for (int tries = 0; tries < 3; tries++) {
         int element;
-        const double inside = silt_walls_distance(c->walls, to, &element) - g->radius;
+        double image[3] = {to[0], to[1], to[2]};
+        if (suspend_period(c) > 0.0) // walls end where the period does
+            image[0] -= suspend_period(c) * floor((to[0] - c->scene->period[0]) / suspend_period(c));
+        const double inside = silt_walls_distance(c->walls, image, &element) - g->radius;
         if (element < 0 || inside >= 0.0)
             break;
         for (int d = 0; d < D; d++)
@@ -169,7 +187,8 @@ void silt_coupling_walk(silt_coupling *c, const silt_nodes *nodes, const silt_me
     for (int i = 0; i < c->n_grain && i < c->n_loaded; i++) {
         coupling_grain *p = &c->grain[i];
         const silt_exchange_grain *e = &c->exchange.grain[i];
-        if (p->gone || p->fixed || e->cell < 0 || silt_length(c->dim, p->contact) > touching * p->mass * g)
+        const bool rests = silt_length(c->dim, p->contact) > touching * p->mass * g;
+        if (p->gone || p->fixed || e->cell < 0 || (rests && !scene->grains.pick_up))
             continue;
         uint64_t random = silt_hash(0, &scene->fluid.seed, sizeof scene->fluid.seed);
         random = silt_hash(silt_hash(random, &step, sizeof step), &p->id, sizeof p->id);

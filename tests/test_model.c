@@ -84,7 +84,7 @@ static void test_warn(void **state) {
     warns(1, (const char *[]){"fluid.shuffle=0.1"}, 1, "a test");
     warns(1, (const char *[]){"periodic=[0, 2]"}, 0, "");
     warns(2, (const char *[]){"periodic=[0, 2]", "fluid.outlets=[{name: o, from: [2, 0], to: [2, 1]}]"}, 1,
-          "periodic for the water alone");
+          "periodic for water and grains alone");
 }
 
 // an output folder holds all that its scene reads, each file once

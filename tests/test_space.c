@@ -505,6 +505,53 @@ static void test_profiles(void **state) {
     assert_int_equal(silt_frame_cut(folder, -1, &err), SILT_OK);
 }
 
+// discs in layers of 0.1 m at two times: their area over the thickness, its mean, and over what is at a place
+static void test_grain_profile(void **state) {
+    (void)state;
+    world w;
+    silt_error err = {0};
+    const int64_t id[] = {1, 2, 3, 4};
+    double x[12] = {5, 0.2, 0, 6, 0.22, 0, 7, 0.5, 0, 8, 0.56, 0}, rest[12] = {0};
+    const double radius[] = {0.01, 0.02, 0.03, 0.04};
+    const silt_grain_state grains = {.count = 4, .id = id, .x = x, .v = rest, .omega = rest, .radius = radius};
+    ring_make(&w);
+    w.scene.grains.on = true;
+    w.view.grains = &grains;
+    for (int i = 0; i < 3; i++) {
+        w.view.time = i;
+        x[10] = i == 2 ? 0.54 : 0.56; // at 2 s the fourth is in the layer around 0.5
+        assert_int_equal(silt_frame_write(folder, i, &w.view, &err), SILT_OK);
+    }
+    make("history.csv", "step,time\n");
+    // pi 0.0005/0.1, 0, pi 0.0009/0.1 and at 2 s pi 0.0025/0.1
+    make("grains.csv", "s,early,late,mean,unit\n0.2,0.005,0.005,0.005,1\n0.35,0,0,0,0\n0.5,0.009,0.025,0.017,3.4\n");
+    silt_check_def def = profile_of(PROFILE_GRAINS, 1, "grains.csv");
+    memcpy(def.line, (double[]){3, 0, 0, 3, 1, 0}, sizeof def.line);
+    def.layer = 0.1;
+    def.since = def.unit_at = NAN;
+    def.scale = 1 / M_PI;
+    def.y = (char *)(uintptr_t) "early";
+    near(profile(&w, &def).error, 0, 1e-14);
+    def.at = 2;
+    def.y = (char *)(uintptr_t) "late";
+    near(profile(&w, &def).error, 0, 1e-14);
+    def.since = 1;
+    def.y = (char *)(uintptr_t) "mean";
+    near(profile(&w, &def).error, 0, 1e-14);
+    def.scale = 1;
+    def.unit_at = 0.2;
+    def.y = (char *)(uintptr_t) "unit";
+    near(profile(&w, &def).error, 0, 1e-13);
+    // nothing where it is to be 1, and a mean that the frames do not reach
+    def.unit_at = 0.35;
+    silt_check_result r = profile(&w, &def);
+    assert_false(r.pass);
+    contains(r.note, "there are no grains at 0.35");
+    def.at = 3;
+    contains(profile(&w, &def).note, "the frames are from 0 to 2 s, the profile is wanted from 1 to 3");
+    assert_int_equal(silt_frame_cut(folder, -1, &err), SILT_OK);
+}
+
 // ---------------------------------------------------------------- pictures
 
 // sections of the cube and of the drop: area, values, and one outline each
@@ -598,7 +645,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_gauges),   cmocka_unit_test(test_wall_forces), cmocka_unit_test(test_frames),
         cmocka_unit_test(test_periodic), cmocka_unit_test(test_profiles),    cmocka_unit_test(test_slice),
-        cmocka_unit_test(test_draw),
+        cmocka_unit_test(test_draw),     cmocka_unit_test(test_grain_profile),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -23,7 +23,7 @@ static void near(double value, double expected, double tolerance, const char *wh
         fail_msg("%s: %.17g, expected %.17g within %g", what, value, expected, tolerance);
 }
 
-// a closed tank of 0.1 m full of water, small grains in `box` of it, without weight
+// a closed tank of 0.1 m full of water, grains in `box` of it, without weight
 typedef struct basin {
     silt_scene *scene;
     silt_walls walls;
@@ -33,16 +33,19 @@ typedef struct basin {
     double *viscosity; // per cell
 } basin;
 
-static void basin_open(basin *b, const char *box, int count, int seed) {
+static void basin_open_as(basin *b, const char *box, int count, int seed, double diameter, bool periodic) {
     FILE *to = fopen("test_walk.yaml", "w");
     assert_non_null(to);
-    fprintf(to, "silt: 1\ntitle: walk\ndimension: 2\ntime: {end: 1, output: 1}\ngravity: [0, 0]\nfluid:\n  density: 1000\n  viscosity: 1.0e-3\n"
+    fprintf(to, "silt: 1\ntitle: walk\ndimension: 2\n%stime: {end: 1, output: 1}\ngravity: [0, 0]\nfluid:\n  density: 1000\n  viscosity: 1.0e-3\n"
                 "  size: 0.005\n  seed: %d\n  regions: [{box: [[0, 0], [0.1, 0.1]]}]\n"
-                "walls: [{polyline: [[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1], [0, 0]], condition: slip}]\n"
+                "walls: [%s]\n"
                 "grains:\n  drag: none\n  random_walk: true\n  schmidt: 0.5\n"
-                "  regions: [{box: %s, diameter: 2.0e-5, density: 2650, count: %d, arrangement: random}]\n"
+                "  regions: [{box: %s, diameter: %g, density: 2650, count: %d, arrangement: random}]\n"
                 "contact: {youngs_modulus: 5.0e6, poissons_ratio: 0.3, restitution: 0.5, friction: 0.4, rolling_friction: 0}\n",
-            seed, box, count);
+            periodic ? "periodic: [0, 0.1]\n" : "", seed,
+            periodic ? "{polyline: [[0, 0], [0.1, 0]], condition: slip}, {polyline: [[0.1, 0.1], [0, 0.1]], condition: slip}"
+                     : "{polyline: [[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1], [0, 0]], condition: slip}",
+            box, diameter, count);
     fclose(to);
     memset(b, 0, sizeof *b);
     OK(silt_scene_read("test_walk.yaml", 0, NULL, &b->scene, &error));
@@ -55,6 +58,8 @@ static void basin_open(basin *b, const char *box, int count, int seed) {
     OK(dem->open(&b->coupling, &def, &error));
     b->viscosity = silt_alloc((size_t)b->mesh.n_cell, sizeof *b->viscosity);
 }
+
+static void basin_open(basin *b, const char *box, int count, int seed) { basin_open_as(b, box, count, seed, 2e-5, false); }
 
 static void basin_close(basin *b) {
     dem->close(&b->coupling);
@@ -141,6 +146,39 @@ static void test_well_mixed(void **unused) {
     basin_close(&b);
 }
 
+// where the scene repeats, grains keep off each other across its ends, and walls throw them back there too
+static void test_around(void **unused) {
+    (void)unused;
+    basin b;
+    const double diameter = 0.004;
+    basin_open_as(&b, "[[0, 0], [0.1, 0.1]]", 200, 3, diameter, true);
+    for (int e = 0; e < b.mesh.n_cell; e++)
+        b.viscosity[e] = 1e-3 + 1000 * 0.5 * 1e-3;
+    int crossed = 0;
+    double before[200];
+    for (int step = 0; step < 40; step++) {
+        const silt_grain_state *grains = dem->grains(b.coupling);
+        for (int i = 0; i < 200; i++)
+            before[i] = grains->x[3 * i];
+        grains = basin_walk(&b, 0.01, step); // 4.5 mm a step
+        assert_int_equal(grains->count, 200);
+        double least = HUGE_VAL;
+        for (int i = 0; i < 200; i++) {
+            crossed += fabs(grains->x[3 * i] - before[i]) > 0.05;
+            assert_true(grains->x[3 * i + 1] > 0.499 * diameter && grains->x[3 * i + 1] < 0.1 - 0.499 * diameter);
+            for (int k = 0; k < i; k++) {
+                double dx = grains->x[3 * i] - grains->x[3 * k], dy = grains->x[3 * i + 1] - grains->x[3 * k + 1];
+                dx -= 0.1 * round(dx / 0.1);
+                least = silt_min(least, hypot(dx, dy));
+            }
+        }
+        near(silt_max(diameter - least, 0), 0, 1e-6 * diameter, "overlap");
+    }
+    print_message("%d crossings\n", crossed);
+    assert_true(crossed > 50);
+    basin_close(&b);
+}
+
 static void test_keyed(void **unused) {
     (void)unused;
     double first[3][2];
@@ -172,6 +210,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_variance),
         cmocka_unit_test(test_well_mixed),
+        cmocka_unit_test(test_around),
         cmocka_unit_test(test_keyed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

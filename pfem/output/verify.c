@@ -176,7 +176,8 @@ static void verify_curve_check(const silt_scene *scene, const char *out, verify_
     silt_curve reference = {0};
     if (!verify_read(scene, out, files, check, &reference, result))
         goto done;
-    if (def->kind == CHECK_PROFILE && !silt_profile_sample(scene, out, def, &reference, history, result->note))
+    if (def->kind == CHECK_PROFILE && !(def->profile == PROFILE_GRAINS ? silt_profile_grains : silt_profile_sample)(
+                                          scene, out, def, &reference, history, result->note))
         goto done;
     if (def->kind != CHECK_PROFILE && !isnan(def->align)) {
         double here = silt_curve_reaches(history, def->align), there = silt_curve_reaches(&reference, def->align);

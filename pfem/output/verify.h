@@ -26,5 +26,9 @@ double silt_curve_reaches(const silt_curve *curve, double level);
  * @return false with a note (256 characters): no frames around the time, or none with the field */
 bool silt_profile_sample(const silt_scene *scene, const char *out, const silt_check_def *def,
                          const silt_curve *reference, silt_curve *profile, char *note);
+/** The same for PROFILE_GRAINS: grains in layers across the line, mean over the frames from `since` to `at`.
+ * @return false with a note: the frames do not reach so far, or no grain is where the profile is to be 1 */
+bool silt_profile_grains(const silt_scene *scene, const char *out, const silt_check_def *def, const silt_curve *reference,
+                         silt_curve *profile, char *note);
 
 #endif

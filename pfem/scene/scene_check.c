@@ -46,6 +46,9 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         !silt_tree_item(fluid, "cloud"))
         silt_complain_key(reader, fluid,
                           "key 'fluid.regions': found neither regions nor inlets, allowed at least one: there is no water");
+    if (scene->grains.kernel_layers && !(scene->period[0] < scene->period[1]))
+        silt_complain(reader, silt_tree_item(grains, "kernel_layers"),
+                      "key 'grains.kernel_layers': found true, allowed in a periodic scene: its means are taken along the whole of x");
     const silt_tree *regions = silt_tree_item(bed, "regions");
     if (regions && regions->kind == TREE_LIST && regions->n_item == 0)
         silt_complain(reader, regions, "key 'bed.regions': found an empty list, allowed at least one region");
@@ -489,7 +492,7 @@ static const char *const check_fixed[] = {
     "bed_y_plus", "seepage", "seepage_volume", "seepage_lost", "grain_count", "grain_mass", "grain_velocity_x",
     "grain_velocity_y", "grain_velocity_z", "grain_kinetic_energy", "grain_potential_energy", "grain_water_x",
     "grain_water_y", "grain_water_z", "grain_contact_x", "grain_contact_y", "grain_contact_z", "sediment_error",
-    "left_mass", "inflow_mass", "outflow_mass", "wall_mesh", "wall_assemble", "wall_solve", "wall_bed", "wall_dem",
+    "left_mass", "fed_mass", "inflow_mass", "outflow_mass", "wall_mesh", "wall_assemble", "wall_solve", "wall_bed", "wall_dem",
     "wall_move", "wall_output"};
 // clang-format on
 static const char *const check_of_body[] = {"x",  "y",  "z",  "vx", "vy", "vz", "qw", "qx", "qy", "qz", "wx",
@@ -669,6 +672,28 @@ static void check_places(silt_reader *reader, const silt_scene *scene, int i, co
         silt_complain(reader, node, "key 'checks.%d.reference': found nothing in this block, allowed a CSV file", i);
 }
 
+// the mean over layers belongs to grains, which have to be there
+static void check_layers(silt_reader *reader, const silt_scene *scene, int i, const silt_tree *node) {
+    static const char *const own[] = {"since", "layer", "unit_at"};
+    const silt_check_def *check = &scene->check[i];
+    const bool grains = check->kind == CHECK_PROFILE && check->profile == PROFILE_GRAINS;
+    const bool given[] = {!isnan(check->since), check->layer != 0, !isnan(check->unit_at)};
+    for (int k = 0; k < 3 && check->kind == CHECK_PROFILE && !grains; k++)
+        if (given[k])
+            silt_complain_key(reader, silt_tree_item(node, own[k]),
+                              "key 'checks.%d.%s': found it with another profile, allowed only with profile: grains", i, own[k]);
+    if (!grains)
+        return;
+    if (!scene->grains.on)
+        silt_complain_key(reader, silt_tree_item(node, "profile"),
+                          "key 'checks.%d.profile': found a profile of grains, allowed in a scene with a block grains", i);
+    if (check->layer <= 0)
+        silt_complain(reader, node, "key 'checks.%d.layer': found no thickness, allowed a number in m, > 0", i);
+    if (check->since > check->at)
+        silt_complain_key(reader, silt_tree_item(node, "since"), "key 'checks.%d.since': found %g, allowed a time up to `at`, %g s", i,
+                          check->since, check->at);
+}
+
 // each check has one target, one thing to hold it against, and a tolerance
 static void check_checks(silt_reader *reader, silt_scene *scene, const check_column *column, int n) {
     for (int i = 0; i < scene->n_check; i++) {
@@ -678,6 +703,7 @@ static void check_checks(silt_reader *reader, silt_scene *scene, const check_col
             continue;
         check_target(reader, scene, i, column, n);
         check_places(reader, scene, i, node);
+        check_layers(reader, scene, i, node);
         const silt_tree *reference = silt_tree_item(node, "reference"), *scalar = silt_tree_item(node, "scalar");
         const silt_tree *value = silt_tree_item(node, "value"), *range = silt_tree_item(node, "range");
         bool is_scalar = check->scalar != SCALAR_NONE;

@@ -72,6 +72,7 @@ static const silt_word check_profile_words[] = {{"surface", PROFILE_SURFACE},
                                           {"velocity_z", PROFILE_VELOCITY_Z},
                                           {"speed", PROFILE_SPEED},
                                           {"pressure", PROFILE_PRESSURE},
+                                          {"grains", PROFILE_GRAINS},
                                           {0}};
 static const silt_word formula_words[] = {{"uniform", FORMULA_UNIFORM},
                                           {"solid-rotation", FORMULA_SOLID_ROTATION},
@@ -170,6 +171,9 @@ static const silt_key inlet_rows[] = {
             "in with: a number, or a CSV file beside the scene with time in s, level in m"},
     {"series", KEY_SERIES, .flags = KEY_OPTIONAL, .when = ONLY(INLET_VELOCITY), AT(silt_inlet, series),
      .doc = "CSV file beside the scene: time in s, factor on the velocity"},
+    {"grains", KEY_NUMBER, .unit = "kg/s", .fallback = "0", NOT_NEGATIVE, .when = ONLY(INLET_VELOCITY), AT(silt_inlet, grains),
+     .doc = "sediment that comes in with the water (2-D: kg/s per m of width), times the factor of `series`: parcels of grains.parcel "
+            "with bed.density, at random places of the inlet; needs a bed"},
     {0}};
 TABLE(inlet, "an inlet", silt_inlet, offsetof(silt_inlet, drive));
 
@@ -457,6 +461,9 @@ static const silt_key grains_rows[] = {
      .doc = "accounting width; 0: (2/3)(0.82) d/(1 - n) of the parcel; without a bed 0.91 d with regions (n = 0.4), else 5 d"},
     {"kernel", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, kernel),
      .doc = "width of the porosity kernel; 0: the larger of 3 d and 2 h"},
+    {"kernel_layers", KEY_SWITCH, .fallback = "false", .flags = KEY_PLANE, AT(silt_grains_def, kernel_layers),
+     .doc = "the kernel takes means along the whole of x, in layers as thick as `kernel`: for level beds in periodic channels, whose water is the "
+            "same along x in the mean and changes within a grain's height over the bed"},
     {"added_mass", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, added_mass),
      .doc = "share of the displaced water that is accelerated along; spheres: 0.5"},
     {"lift", KEY_WORD, .fallback = "none", .words = lift_words, AT(silt_grains_def, lift), .doc = "force across the water's shear"},
@@ -464,8 +471,13 @@ static const silt_key grains_rows[] = {
      .doc = "force of the water's viscous stress on the grain's volume"},
     {"rotational_drag", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, rotational_drag),
      .doc = "torque of the water on grains that spin otherwise than it does"},
+    {"eddy_limit", KEY_NUMBER, .fallback = "0", .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_grains_def, eddy_limit),
+     .doc = "share of grains in the water at which eddies have no room: the mixing length counts the way to the wall times 1 - share/limit "
+            "(Li and Sawamoto 1995; 0.6); 0: grains do not hinder eddies"},
     {"random_walk", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, random_walk),
      .doc = "suspended grains wander with the eddies that the mesh does not show; random numbers by fluid.seed"},
+    {"pick_up", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, pick_up),
+     .doc = "grains at rest walk too: what settles on the ground it gives back, as far as the eddies reach down to it"},
     {"schmidt", KEY_NUMBER, .fallback = "1", POSITIVE, AT(silt_grains_def, schmidt),
      .doc = "eddy viscosity over the diffusivity of that walk"},
     {"list", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &grain_table, MANY(silt_grains_def, n_grain, grain),
@@ -574,7 +586,8 @@ static const silt_key check_rows[] = {
      .doc = "a column of history.csv"},
     {"profile", KEY_WORD, .flags = KEY_CHOICE, .select = CHECK_PROFILE, .words = check_profile_words,
      AT(silt_check_def, profile),
-     .doc = "along a line at the time `at`, from the frames; the surface is the top of connected water"},
+     .doc = "along a line at the time `at`, from the frames; the surface is the top of connected water; grains: volume of those "
+            "with their centre in a layer across the line, over its thickness, m2 (2-D: m)"},
     {"reference", KEY_FILE, .flags = KEY_OPTIONAL, AT(silt_check_def, reference), .doc = "CSV file beside the scene"},
     {"x", KEY_TEXT, .flags = KEY_OPTIONAL, AT(silt_check_def, x),
      .doc = "abscissa in the reference; default its first column"},
@@ -609,6 +622,12 @@ static const silt_key check_rows[] = {
      AT(silt_check_def, scalar), .doc = "a number made of the column instead of a reference"},
     {"at", KEY_NUMBER, .fallback = ".nan", AT(silt_check_def, at),
      .doc = "abscissa of the scalar `at`; time of a profile in s, between frames linear"},
+    {"since", KEY_NUMBER, .unit = "s", .fallback = ".nan", .when = ONLY(CHECK_PROFILE), AT(silt_check_def, since),
+     .doc = "the profile of grains is the mean of the frames from this time to `at`"},
+    {"layer", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, .when = ONLY(CHECK_PROFILE), AT(silt_check_def, layer),
+     .doc = "thickness of the layer around every place of a profile of grains"},
+    {"unit_at", KEY_NUMBER, .fallback = ".nan", .when = ONLY(CHECK_PROFILE), AT(silt_check_def, unit_at),
+     .doc = "the profile of grains is divided by what it is at this abscissa"},
     {"level", KEY_NUMBER, .fallback = ".nan", .when = ONLY(CHECK_COLUMN), AT(silt_check_def, level),
      .doc = "ordinate that the scalar `reaches` waits for, or that `period` counts crossings of (default the mean)"},
     {"value", KEY_NUMBER, .fallback = ".nan", AT(silt_check_def, value), .doc = "expected scalar"},

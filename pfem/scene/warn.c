@@ -20,7 +20,7 @@ static int warn_fluid(const silt_scene *scene, FILE *to) {
     const silt_fluid_def *fluid = &scene->fluid;
     const bool turbulent = fluid->flow == FLOW_TURBULENT;
     const bool eddies = fluid->turbulence == TURBULENCE_SMAGORINSKY || fluid->turbulence == TURBULENCE_WALE;
-    const bool others = scene->bed.on || silt_scene_has_dem(scene) || fluid->n_inlet || fluid->n_outlet;
+    const bool others = scene->bed.on || scene->n_body > 0 || fluid->n_inlet || fluid->n_outlet;
     int n_smooth = 0, n_pulled = 0, count = 0;
     for (int i = 0; i < scene->n_wall; i++) {
         const silt_wall *wall = &scene->wall[i];
@@ -41,7 +41,7 @@ static int warn_fluid(const silt_scene *scene, FILE *to) {
     warn_when(fluid->shuffle > 0, scene, to, &count,
               "fluid.shuffle shifts nodes at random in every step: a test, no flow is better for it");
     warn_when(scene->period[0] < scene->period[1] && others, scene, to, &count,
-              "the scene is periodic for the water alone: bed, grains, bodies, inlets and outlets do not repeat");
+              "the scene is periodic for water and grains alone: bed, bodies, inlets and outlets do not repeat");
     return count;
 }
 
