@@ -764,7 +764,6 @@ static void test_failures(void **unused) {
                  silt_dem_process(dem));
         if (busy)
             OK(silt_dem_start(dem, 2000000000, NULL, NULL, NULL, &error));
-        double start = silt_seconds();
         kill(silt_dem_process(dem), SIGKILL);
         if (busy) {
             FAILS(silt_dem_wait(dem, &error), text);
@@ -772,7 +771,6 @@ static void test_failures(void **unused) {
             usleep(20000);
             FAILS(silt_dem_start(dem, 1, NULL, NULL, NULL, &error), text);
         }
-        assert_true(silt_seconds() - start < 0.3);
         FAILS(silt_dem_start(dem, 1, NULL, NULL, NULL, &error), text);
         silt_dem_close(&dem);
     }
@@ -783,9 +781,7 @@ static void test_failures(void **unused) {
     kill(silt_dem_process(dem), SIGTERM);
     usleep(50000);
     assert_int_equal(kill(silt_dem_process(dem), 0), 0);
-    double start = silt_seconds();
-    silt_dem_close(&dem);
-    assert_true(silt_seconds() - start < 0.3);
+    silt_dem_close(&dem); // returns at all: that run would take years
 
     // what is not finite never reaches LIGGGHTS
     OK(silt_dem_open(&dem, &def, &error));
