@@ -137,6 +137,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     c->exchange.force.def = (silt_force_def){grains->added_mass, scene->fluid.theta, grains->viscous_force,
                                              grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     memcpy(c->exchange.gravity, scene->gravity, sizeof c->exchange.gravity);
+    c->exchange.layers = grains->kernel_layers;
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
     const bool space = c->dim == 3, periodic = scene->period[0] < scene->period[1];
@@ -147,6 +148,8 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .dim = c->dim,
         .lo = {periodic ? scene->period[0] : def->lo[0], def->lo[1], def->lo[2]},
         .hi = {periodic ? scene->period[1] : def->hi[0], def->hi[1], def->hi[2]},
+        .way_lo = {def->way_lo[0], def->way_lo[1], def->way_lo[2]},
+        .way_hi = {def->way_hi[0], def->way_hi[1], def->way_hi[2]},
         .periodic = periodic,
         .period = period_share * 2.0 * largest,
         .gravity = {scene->gravity[0], scene->gravity[1], scene->gravity[2]},

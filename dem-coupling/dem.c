@@ -145,6 +145,8 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
 
     memcpy(s->lo, def->lo, sizeof s->lo);
     memcpy(s->hi, def->hi, sizeof s->hi);
+    memcpy(s->way_lo, def->way_lo, sizeof s->way_lo);
+    memcpy(s->way_hi, def->way_hi, sizeof s->way_hi);
     memcpy(s->gravity, def->gravity, sizeof s->gravity);
     s->dim = def->dim == 3 ? 3 : 2;
     s->periodic = def->periodic;

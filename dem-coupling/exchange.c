@@ -473,7 +473,9 @@ static void exchange_choose_along(silt_exchange *e, double reach) {
 
 static void exchange_choose(silt_exchange *e) {
     exchange_mark(e);
-    if (e->n_wet > 0 && (e->dim == 3 || e->mesh->period[0] > 0.0))
+    if (e->n_wet > 0 && e->layers)
+        memcpy(e->chosen, e->mesh->wet, (size_t)e->mesh->n_node);
+    else if (e->n_wet > 0 && (e->dim == 3 || e->mesh->period[0] > 0.0))
         exchange_choose_along(e, (e->dim == 3 ? sweep_reach : kernel_reach) * e->width);
     else if (e->n_wet > 0)
         exchange_choose_plane(e);
@@ -565,7 +567,7 @@ silt_status silt_exchange_place(silt_exchange *e, const silt_nodes *nodes, const
     SILT_RESERVE(e->index, e->node_capacity[8], n);
     SILT_RESERVE(e->placed_x, e->node_capacity[7], D * n);
     exchange_choose(e);
-    SILT_TRY(silt_kernel_build(&e->kernel, mesh, nodes->x, e->chosen, e->width, err));
+    SILT_TRY(silt_kernel_build(&e->kernel, mesh, nodes->x, e->chosen, e->width, e->layers, err));
     exchange_look(e);
     SILT_RESERVE(e->read, e->node_capacity[4], READ_FIELDS(D) * (e->n_look + 1));
     SILT_RESERVE(e->give, e->node_capacity[5], GIVE_FIELDS * (e->n_look + 1));

@@ -55,18 +55,73 @@ static silt_status kernel_measure(silt_kernel *kernel, const silt_mesh *mesh, co
     return SILT_OK;
 }
 
+// ---------------------------------------------------------------- layers
+
+// hats over the heights of the kernel's nodes, at multiples of their width: the same ones whatever nodes there are
+static void kernel_layers(silt_kernel *kernel, const double *x, double width) {
+    const int n = kernel->n_node;
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (int k = 0; k < n; k++) {
+        low = silt_min(low, x[2 * kernel->node[k] + 1]);
+        high = silt_max(high, x[2 * kernel->node[k] + 1]);
+    }
+    const double first = n > 0 ? floor(low / width) : 0.0;
+    kernel->n_layer = n > 0 ? (int)(floor(high / width) - first) + 2 : 1;
+    SILT_RESERVE(kernel->layer, kernel->layer_capacity[0], n + 1);
+    SILT_RESERVE(kernel->above, kernel->layer_capacity[1], n + 1);
+    SILT_RESERVE(kernel->hat, kernel->layer_capacity[2], kernel->n_layer);
+    SILT_RESERVE(kernel->sum, kernel->layer_capacity[3], kernel->n_layer);
+    memset(kernel->hat, 0, (size_t)kernel->n_layer * sizeof *kernel->hat);
+    for (int k = 0; k < n; k++) {
+        const double y = x[2 * kernel->node[k] + 1] / width - first, volume = kernel->volume[kernel->node[k]];
+        kernel->layer[k] = (int)y;
+        kernel->above[k] = y - (int)y;
+        kernel->hat[(int)y] += (1.0 - kernel->above[k]) * volume;
+        kernel->hat[(int)y + 1] += kernel->above[k] * volume;
+    }
+}
+
+static void kernel_layers_solve(const silt_kernel *kernel, int n_field, double *field) {
+    for (int f = 0; f < n_field; f++) {
+        memset(kernel->sum, 0, (size_t)kernel->n_layer * sizeof *kernel->sum);
+        for (int k = 0; k < kernel->n_node; k++) {
+            const double value = field[n_field * k + f], up = kernel->above[k];
+            kernel->sum[kernel->layer[k]] += (1.0 - up) * value;
+            kernel->sum[kernel->layer[k] + 1] += up * value;
+        }
+        for (int m = 0; m < kernel->n_layer; m++)
+            kernel->sum[m] = kernel->hat[m] > 0.0 ? kernel->sum[m] / kernel->hat[m] : 0.0;
+        for (int k = 0; k < kernel->n_node; k++) {
+            const double *sum = kernel->sum + kernel->layer[k];
+            field[n_field * k + f] = sum[0] + kernel->above[k] * (sum[1] - sum[0]);
+        }
+    }
+}
+
+// ---------------------------------------------------------------- all kinds
+
+static void kernel_places(silt_kernel *kernel, int n_node) {
+    for (int i = 0; i < n_node; i++)
+        kernel->place[i] = kernel->n_node;
+    for (int k = 0; k < kernel->n_node; k++)
+        kernel->place[kernel->node[k]] = k;
+}
+
 silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const double *x, const uint8_t *chosen,
-                              double width, silt_error *err) {
+                              double width, bool layers, silt_error *err) {
     kernel->dim = mesh->dim == 3 ? 3 : 2;
+    kernel->n_layer = 0;
     kernel_choose(kernel, mesh, chosen);
     SILT_TRY(kernel_measure(kernel, mesh, x, width, err));
     if (kernel->dim == 3) {
-        for (int i = 0; i < mesh->n_node; i++)
-            kernel->place[i] = kernel->n_node;
-        for (int k = 0; k < kernel->n_node; k++)
-            kernel->place[kernel->node[k]] = k;
+        kernel_places(kernel, mesh->n_node);
         silt_sweep_build(&kernel->sweep, mesh, kernel->n_node, kernel->node, kernel->place, kernel->n_near, kernel->near, kernel->volume,
                          width * width / 4.0, kernel->edge);
+        return SILT_OK;
+    }
+    if (layers) {
+        kernel_places(kernel, mesh->n_node);
+        kernel_layers(kernel, x, width);
         return SILT_OK;
     }
     // a node without a cell keeps what is asked of it
@@ -87,6 +142,8 @@ silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const 
 void silt_kernel_solve(const silt_kernel *kernel, int n_field, double *field) {
     if (kernel->dim == 3)
         silt_sweep_solve(&kernel->sweep, n_field, field);
+    else if (kernel->n_layer > 0)
+        kernel_layers_solve(kernel, n_field, field);
     else
         silt_nested_solve(kernel->nested, n_field, field);
 }
@@ -106,7 +163,8 @@ void silt_kernel_clear(silt_kernel *kernel) {
     silt_nested_free(&kernel->nested);
     silt_sweep_clear(&kernel->sweep);
     void *owned[] = {kernel->volume, kernel->area,  kernel->edge, kernel->diagonal,
-                     kernel->node,   kernel->place, kernel->near, kernel->work};
+                     kernel->node,   kernel->place, kernel->near, kernel->work,
+                     kernel->layer, kernel->above, kernel->hat,  kernel->sum};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
     *kernel = (silt_kernel){0};

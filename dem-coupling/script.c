@@ -101,11 +101,23 @@ static void script_materials(void *lmp, const dem_shared *s) {
     script_say(lmp, "pair_coeff * *");
 }
 
+// Which walls are planes must not hang on where those that move are: a run that goes on from a checkpoint would give LIGGGHTS other
+// walls than the run before, and contacts lose their springs. So walls that move count by all that they ever reach.
+static bool script_stands(const dem_shared *s, int i) {
+    return DEM_SECTION(s, const int, wall_motion)[i] < 0;
+}
+static bool script_passes_below(const dem_shared *s, int axis, double c) {
+    return s->n_motion && s->way_lo[axis] < c;
+}
+static bool script_passes_above(const dem_shared *s, int axis, double c) {
+    return s->n_motion && s->way_hi[axis] > c;
+}
+
 // true when another wall ends at x and goes to the side of wall i on which the others lie
 static bool script_joined(const dem_shared *s, int i, const double x[2], double tolerance) {
     const double(*wall)[4] = (const double(*)[4])DEM_SECTION(s, const double, wall);
     for (int j = 0; j < s->n_wall; j++)
-        for (int end = 0; j != i && end < 4; end += 2)
+        for (int end = 0; j != i && script_stands(s, j) && end < 4; end += 2)
             if (fabs(wall[j][end] - x[0]) < tolerance && fabs(wall[j][end + 1] - x[1]) < tolerance)
                 return true;
     return false;
@@ -123,9 +135,9 @@ static int script_plane(const dem_shared *s, int i) {
     if (across < 0)
         return -1;
     int along = 1 - across;
-    bool below = false, above = false;
+    bool below = script_passes_below(s, across, w[across] - tolerance), above = script_passes_above(s, across, w[across] + tolerance);
     for (int j = 0; j < s->n_wall; j++)
-        for (int end = 0; end < 4; end += 2) {
+        for (int end = 0; script_stands(s, j) && end < 4; end += 2) {
             below |= wall[j][end + across] < w[across] - tolerance;
             above |= wall[j][end + across] > w[across] + tolerance;
         }
@@ -194,7 +206,7 @@ static int script_face(const dem_shared *s, int i) {
     const double(*t)[10] = (const double(*)[10])DEM_SECTION(s, const double, triangle);
     double lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY}, size = 0;
     for (int j = 0; j < s->n_triangle; j++)
-        for (int c = 0; c < 9; c++) {
+        for (int c = 0; script_stands(s, s->n_wall + j) && c < 9; c++) {
             lo[c % 3] = fmin(lo[c % 3], t[j][c]);
             hi[c % 3] = fmax(hi[c % 3], t[j][c]);
         }
@@ -207,10 +219,13 @@ static int script_face(const dem_shared *s, int i) {
             across = k;
     if (across < 0 || (fabs(t[i][across] - lo[across]) > tolerance && fabs(t[i][across] - hi[across]) > tolerance))
         return -1;
+    if (fabs(t[i][across] - lo[across]) <= tolerance ? script_passes_below(s, across, lo[across] - tolerance)
+                                                     : script_passes_above(s, across, hi[across] + tolerance))
+        return -1;
     const int p = (across + 1) % 3, q = (across + 2) % 3;
     double area = 0;
     for (int j = 0; j < s->n_triangle; j++) {
-        bool in = true;
+        bool in = script_stands(s, s->n_wall + j);
         for (int c = 0; c < 3; c++)
             in &= fabs(t[j][3 * c + across] - t[i][across]) < tolerance;
         if (!in)

@@ -16,6 +16,7 @@ typedef struct silt_coupling_def {
     const char *worker;      // path of silt-dem
     const char *log;         // OUT/dem.log
     double lo[3], hi[3];     // the domain's box (with margin): what leaves it has left
+    double way_lo[3], way_hi[3]; // m, what walls with a motion span from the start to the end
 } silt_coupling_def;
 
 /** what passed between grains, water and the rest in a step: N per m of width, mean over the step */

@@ -413,7 +413,8 @@ typedef struct silt_ledger {
     double seepage_volume; // m3, the same, cumulative
     double seepage_lost;   // m3, cumulative: came out of the bed where no water is to take it; part of outflow_mass
     double bed_mass, released_mass, deposited_mass, left_mass;      // sediment, cumulative, kg
-    double released_rest, deposited_rest;         // kg, what rounding left out of the two (silt_sum)
+    double fed_mass;                              // came in with the water of inlets
+    double released_rest, deposited_rest, fed_rest; // kg, what rounding left out of the three (silt_sum)
     double bed_shear, bed_work, bed_y_plus;       // Pa, J/m3, largest on the bed's surface; see bed.y_plus
     double initial_sediment;
     double left_solid; // m3, water that the grains that left displaced, cumulative

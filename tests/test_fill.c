@@ -279,6 +279,33 @@ static void test_heap(void **state) {
     assert_true(fabs(silt_heap_gauge(&heap, &view, &slope) - 180 / M_PI * atan(0.5)) < 1e-9);
     silt_heap_clear(&heap);
 
+    // the same heap upright in space, two rows of it that touch: the one behind lies lower by 0.1 and does not count in the slope
+    scene.dimension = 3;
+    double deep[6 * N];
+    for (int i = 0; i < 2 * N; i++) {
+        const double *of = x + 3 * (i % N);
+        deep[3 * i] = of[0], deep[3 * i + 1] = i < N ? 0.4 : 0.7, deep[3 * i + 2] = of[1] - (i < N ? 0 : 0.1);
+    }
+    double twice_radius[2 * N], twice_mass[2 * N];
+    for (int i = 0; i < 2 * N; i++) {
+        twice_radius[i] = radius[i % N];
+        twice_mass[i] = mass[i % N];
+    }
+    const silt_grain_state space = {.count = 2 * N, .x = deep, .radius = twice_radius, .mass = twice_mass};
+    const silt_view upright = {.scene = &scene, .grains = &space};
+    silt_heap_find(&heap, &upright);
+    for (int i = 0; i < 2 * N; i++)
+        assert_int_equal(heap.in[i], i % N < 8);
+    const silt_gauge_def front_row = {.kind = GAUGE_GRAIN_HEIGHT, .from = {0.75, 0.4}}, back_row = {.kind = GAUGE_GRAIN_HEIGHT, .from = {0.75, 0.7}};
+    const silt_gauge_def beside = {.kind = GAUGE_GRAIN_HEIGHT, .from = {0.75, 1}};
+    assert_true(fabs(silt_heap_gauge(&heap, &upright, &right) - 2.25 - radius[0]) < 1e-12);
+    assert_true(fabs(silt_heap_gauge(&heap, &upright, &left) - 0.15 + radius[0]) < 1e-12);
+    assert_true(fabs(silt_heap_gauge(&heap, &upright, &front_row) - 1.7 - radius[0]) < 1e-12);
+    assert_true(fabs(silt_heap_gauge(&heap, &upright, &back_row) - 1.6 - radius[0]) < 1e-12);
+    assert_true(isnan(silt_heap_gauge(&heap, &upright, &beside)));
+    assert_true(fabs(silt_heap_gauge(&heap, &upright, &slope) - 180 / M_PI * atan(0.5)) < 1e-9);
+    silt_heap_clear(&heap);
+
     // one grain by its number; of one that is gone nothing
     double value[3] = {NAN, NAN, NAN};
     silt_grain_gauge(&view, &(silt_gauge_def){.kind = GAUGE_GRAIN_FORCE, .index = 4}, value);

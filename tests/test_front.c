@@ -6,6 +6,7 @@
 
 #include "dense.h"
 #include "front.h"
+#include "front_inside.h"
 
 #define MOST_BESIDE 128
 #define ROUNDED 1.2e-7 // single precision
@@ -166,6 +167,17 @@ static bool close_by(const graph *g, int i, int j) {
 }
 
 // the same bits for any number of threads
+// what is written back over the end of a branch's panels meets no other branch's
+static void panels_apart(const silt_front *f) {
+    assert_true(f->n_branch > 2);
+    for (int k = 0; k + 1 < f->n_branch; k++) {
+        const struct block *last = &f->block[f->branch[k].end - 1];
+        const int own = last->end - last->begin, wide = own + last->row_end - last->row_begin;
+        assert_int_equal(f->branch[k].end, f->branch[k + 1].begin);
+        assert_true(f->block[f->branch[k + 1].begin].value >= last->value + (size_t)own * (size_t)wide + DENSE_PAD);
+    }
+}
+
 static void threads(void **state) {
     (void)state;
     graph g;
@@ -181,6 +193,7 @@ static void threads(void **state) {
         got[k] = silt_alloc((size_t)n, sizeof **got);
         g.matrix.threads = k + 1;
         silt_front_order(&front, &g.matrix, g.x);
+        panels_apart(front);
         assert_int_equal(silt_front_factor(front, &g.matrix), -1);
         silt_front_solve(front, right, got[k]);
         assert_memory_equal(got[k], got[0], (size_t)n * sizeof **got);

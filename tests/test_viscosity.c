@@ -329,6 +329,41 @@ static void test_depth_of_a_periodic_column(void **state) {
     }
 }
 
+// eddies between grains: the integral of 1 - solid/limit from the wall, here of a layer whose share falls linearly to nought over two
+// rows, and of one so dense that nothing is left below
+static void test_grains_leave_eddies_less_room(void **state) {
+    (void)state;
+    for (int dim = 2; dim <= 3; dim++) {
+        column c;
+        column_open(&c, dim, 17, 0.4);
+        column_place(&c);
+        double *solid = silt_alloc((size_t)c.nodes.count, sizeof *solid);
+        const double step = 0.4 / 16, top = 4 * step;
+        for (int dense = 0; dense < 2; dense++) {
+            const double most = dense ? 0.7 : 0.3, limit = 0.6;
+            for (int i = 0; i < c.nodes.count; i++) {
+                const double y = c.nodes.x[dim * i + dim - 1];
+                solid[i] = most * silt_clamp((top + 2 * step - y) / (2 * step), 0, 1);
+            }
+            silt_depth_crowd(&c.depth, &c.mesh, c.nodes.x, solid, limit);
+            for (int i = 0; i < c.nodes.count; i++) {
+                const double y = c.nodes.x[dim * i + dim - 1], k = round((y - top) / step);
+                // 1 - share/limit is 1/2, 3/4, 1 on the rows from the layer's top; 0, 1 - 7/12, 1 over the dense one
+                const double half = k <= 0 ? 0.5 * y : top / 2 + (k <= 2 ? 0.5 * k + k * k / 8 : 1.5 + k - 2) * step;
+                const double row = 5.0 / 12, none = k <= 0 ? 0 : ((k < 1.5 ? row / 2 : row + 0.5) + (k > 2.5 ? k - 2 : 0)) * step;
+                NEAR(c.depth.room[i], dense ? none : half, 1e-12);
+            }
+            // without grains it is the distance again
+            memset(solid, 0, (size_t)c.nodes.count * sizeof *solid);
+            silt_depth_crowd(&c.depth, &c.mesh, c.nodes.x, solid, limit);
+            for (int i = 0; i < c.nodes.count; i++)
+                NEAR(c.depth.room[i], c.depth.wall[i], 1e-12);
+        }
+        free(solid);
+        column_close(&c);
+    }
+}
+
 // a cloud inside a bent outline, walls below and surface above, against trying all facets: a cloud as the solver has it, then
 // one that is scattered without any order
 static void depth_of_cloud(bool scattered, double *wrong, double *worst) {
@@ -759,6 +794,7 @@ int main(void) {
         cmocka_unit_test(test_facet_distance),
         cmocka_unit_test(test_depth_of_a_periodic_column),
         cmocka_unit_test(test_depth_of_clouds),
+        cmocka_unit_test(test_grains_leave_eddies_less_room),
         cmocka_unit_test(test_mixing_length_makes_the_log_law),
         cmocka_unit_test(test_eddy_viscosity_models),
         cmocka_unit_test(test_model_follows_the_scene),

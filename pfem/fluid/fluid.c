@@ -238,6 +238,8 @@ static void resist_begin(silt_fluid *f, const silt_step *s) {
     memset(f->friction, 0, (size_t)f->n_node * sizeof *f->friction);
     if (silt_viscosity_varies(s->scene))
         silt_depth_update(&f->depth, s->scene, s->walls, s->nodes, s->mesh, s->nodes->x);
+    if (s->drag && s->scene->grains.eddy_limit > 0 && silt_turbulence_model(s->scene) != TURBULENCE_NONE)
+        silt_depth_crowd(&f->depth, s->mesh, s->nodes->x, s->drag->solid, s->scene->grains.eddy_limit);
     bool law = s->scene->bed.on && s->scene->bed.condition == WALL_LAW;
     for (int k = 0; k < s->scene->n_wall; k++)
         law |= s->scene->wall[k].condition == WALL_LAW;

@@ -124,6 +124,7 @@ static void depth_reserve(silt_depth *depth, int n_node, int n_facet, int dim) {
         int have;
 #define ROOM(field) (have = depth->node_capacity, depth->field = silt_grow(depth->field, &have, need, sizeof *depth->field))
         ROOM(wall);
+        ROOM(room);
         ROOM(surface);
         ROOM(wall_facet);
         ROOM(surface_facet);
@@ -166,14 +167,60 @@ void silt_depth_update(silt_depth *depth, const silt_scene *scene, const silt_wa
 
     spread(depth, mesh, x, false, depth->wall, depth->wall_facet);
     spread(depth, mesh, x, true, depth->surface, depth->surface_facet);
+    memcpy(depth->room, depth->wall, (size_t)n * sizeof *depth->room);
     depth->enclosed = 0;
     for (int i = 0; i < n; i++)
         if (depth->surface[i] == HUGE_VAL && depth->wall[i] < HUGE_VAL)
             depth->enclosed = silt_max(depth->enclosed, depth->wall[i]);
 }
 
+struct depth_rank {
+    double wall;
+    int node;
+};
+
+static int rank_compare(const void *a, const void *b) {
+    const struct depth_rank *p = a, *q = b;
+    if (p->wall != q->wall)
+        return p->wall < q->wall ? -1 : 1;
+    return p->node - q->node;
+}
+
+// from neighbours nearer to the wall, weighted by how straight the edge leads away from it: sum of (fall/length)^2
+static double room_of(const silt_depth *depth, const silt_mesh *mesh, const double *x, const double *solid, double limit, int i) {
+    const int dim = mesh->dim == 3 ? 3 : 2;
+    double sum = 0, weights = 0;
+    for (int m = mesh->neighbour_start[i]; m < mesh->neighbour_start[i + 1]; m++) {
+        const int j = mesh->neighbour[m];
+        const double way = depth->wall[i] - depth->wall[j];
+        if (j == i || !(way > 0))
+            continue;
+        double square = 0;
+        for (int d = 0; d < dim; d++)
+            square += silt_square(silt_shortest(mesh, d, x[dim * i + d] - x[dim * j + d]));
+        const double open = 0.5 * (silt_max(1 - solid[i] / limit, 0) + silt_max(1 - solid[j] / limit, 0));
+        const double weight = way * way / square;
+        sum += weight * (depth->room[j] + way * open);
+        weights += weight;
+    }
+    return weights > 0 ? sum / weights : depth->wall[i];
+}
+
+void silt_depth_crowd(silt_depth *depth, const silt_mesh *mesh, const double *x, const double *solid, double limit) {
+    int n = 0;
+    SILT_RESERVE(depth->rank, depth->rank_capacity, depth->n_node + 1);
+    for (int i = 0; i < depth->n_node; i++)
+        if (depth->wall[i] > 0 && depth->wall[i] < HUGE_VAL)
+            depth->rank[n++] = (struct depth_rank){depth->wall[i], i};
+    qsort(depth->rank, (size_t)n, sizeof *depth->rank, rank_compare);
+    for (int k = 0; k < n; k++)
+        depth->room[depth->rank[k].node] = room_of(depth, mesh, x, solid, limit, depth->rank[k].node);
+}
+
 void silt_depth_clear(silt_depth *depth) {
     free(depth->wall);
+    free(depth->room);
+    free(depth->rank);
     free(depth->surface);
     free(depth->wall_facet);
     free(depth->surface_facet);
@@ -258,11 +305,12 @@ void silt_viscosity_update(const silt_scene *scene, const silt_nodes *nodes, con
 
         double eddy = 0;
         if (model != TURBULENCE_NONE) {
-            double d = 0, s = 0, h = 0;
+            double d = 0, room = 0, s = 0, h = 0;
             bool law = false;
             for (int a = 0; a <= dim; a++) {
                 const int i = cell[a], facet = depth->wall_facet[i];
                 d += depth->wall[i] / (dim + 1);
+                room += depth->room[i] / (dim + 1);
                 s += depth->surface[i] / (dim + 1);
                 h += silt_node_h(nodes, i, fluid->size) / (dim + 1);
                 law |= facet >= 0 && depth->brakes[facet] == 2;
@@ -270,12 +318,12 @@ void silt_viscosity_update(const silt_scene *scene, const silt_nodes *nodes, con
             // between walls all around the middle stands for the surface
             if (s == HUGE_VAL && d < HUGE_VAL)
                 s = silt_max(depth->enclosed - d, 0);
-            const double mixing = silt_square(silt_mixing_length(d, s)) * rate;
+            const double mixing = silt_square(silt_mixing_length(room, s)) * rate;
             const double delta = 1 / (dim == 3 ? cbrt(inverse[e]) : sqrt(inverse[e]));
             if (model == TURBULENCE_MIXING_LENGTH)
                 eddy = mixing;
             else
-                eddy = model == TURBULENCE_WALE ? silt_eddy_wale(dim, delta, gradient) : silt_eddy_smagorinsky(delta, d, rate);
+                eddy = model == TURBULENCE_WALE ? silt_eddy_wale(dim, delta, gradient) : silt_eddy_smagorinsky(delta, room, rate);
             if (law && d < height * h)
                 eddy = silt_max(eddy, mixing);
         }

@@ -31,12 +31,15 @@ typedef struct silt_depth {
     int n_node, n_facet, node_capacity, facet_capacity, start_capacity, item_capacity;
     double *wall;         // owned, one per node, m, to the nearest facet that brakes the water; HUGE_VAL: none, or dry
     double *surface;      // owned, one per node, m, to the nearest free facet; HUGE_VAL: none, or dry
+    double *room;         // owned, one per node, m, what of the way to the wall eddies have: wall, or less between grains
     int *wall_facet;      // owned, one per node, that facet of the mesh, -1
     int *surface_facet;   // owned, one per node
     uint8_t *brakes;      // owned, one per facet: 0 slip, free or inlet; 1 water sticks to it; 2 law of the wall
     double enclosed;      // m, largest distance to walls where no free surface is: what stands for the depth there
     int *queue;           // owned, working space
     uint8_t *queued;      // owned, working space
+    struct depth_rank *rank; // owned, working space of silt_depth_crowd
+    int rank_capacity;
     int *start, *item;    // owned, facets of a node
 } silt_depth;
 
@@ -45,6 +48,11 @@ typedef struct silt_depth {
  * @param x  dim per node, m */
 void silt_depth_update(silt_depth *depth, const silt_scene *scene, const silt_walls *walls, const silt_nodes *nodes,
                        const silt_mesh *mesh, const double *x);
+/** Grains leave eddies less room: room = int max(0, 1 - solid/limit) ds along the way from the wall (Li and Sawamoto, J. Hydrosci.
+ * Hydraul. Eng. 13, 1995; Revil-Baudard and Chauchat, J. Fluid Mech. 730, 2013, with the limit 0.6). After silt_depth_update. From node to
+ * node in the order of their distance: exact where distance and share hang on one coordinate and the share is linear between nodes.
+ * @param solid  per node, share of grains */
+void silt_depth_crowd(silt_depth *depth, const silt_mesh *mesh, const double *x, const double *solid, double limit);
 void silt_depth_clear(silt_depth *depth);
 
 /** m, distance of a point to a facet of `dim` corners (segment, triangle), dim numbers each */

@@ -1,4 +1,4 @@
-// keeps the water's mesh on the bed in space: faces of the bed that the triangulation has lost
+// keeps the water's mesh on the bed: edges (in space faces) of the bed that the triangulation has lost
 
 #include "remesh.h"
 
@@ -150,7 +150,72 @@ static int fit_flood(fit *f, int face, int apex, double size) {
     return whole ? n : 0;
 }
 
+// ---- in the plane
+
+// sides of the water's cells without a neighbour, as the cells go round; sorted. @return how many
+static int free_sides(const silt_mesh *mesh, int (**side)[3]) {
+    int n = 0, capacity = 0;
+    for (int e = 0; e < mesh->n_cell; e++)
+        for (int a = 0; a < 3; a++)
+            if (mesh->across[e][a] < 0) {
+                SILT_RESERVE(*side, capacity, n + 1);
+                memcpy((*side)[n++], (int[3]){mesh->cell[e][(a + 1) % 3], mesh->cell[e][(a + 2) % 3], 0}, sizeof **side);
+            }
+    if (n)
+        qsort(*side, (size_t)n, sizeof **side, compare_three);
+    return n;
+}
+
+// the first of the sides that is not before from -> to
+static int side_first(int n, const int (*side)[3], int from, int to) {
+    int lo = 0, hi = n;
+    const int key[3] = {from, to, 0};
+    while (lo < hi) {
+        const int middle = (lo + hi) / 2;
+        if (compare_three(side[middle], key) < 0)
+            lo = middle + 1;
+        else
+            hi = middle;
+    }
+    return lo;
+}
+
+static bool side_there(int n, const int (*side)[3], int from, int to) {
+    const int k = side_first(n, side, from, to);
+    return k < n && side[k][0] == from && side[k][1] == to;
+}
+
+// the hollow between a lost edge of the bed and two sides of the water, or one and a wall
+static void fit_edges(silt_draft *draft, const silt_nodes *nodes, const silt_bed *bed, double size) {
+    int(*side)[3] = NULL;
+    const silt_mesh *mesh = draft->mesh;
+    const int n = free_sides(mesh, &side);
+    for (int k = 0; k < bed->n_edge; k++) {
+        const int from = bed->fluid_node[bed->edge[k][0]], to = bed->fluid_node[bed->edge[k][1]];
+        if (from < 0 || to < 0 || side_there(n, side, from, to))
+            continue;
+        for (int m = side_first(n, side, from, -1); m < n && side[m][0] == from; m++) {
+            const int cell[4] = {from, to, side[m][1], -1}, last[3] = {side[m][1], to, -1};
+            if (cell[2] == to || !(side_there(n, side, cell[2], to) || silt_facet_kind_of(mesh, nodes, last) == FACET_WALL))
+                continue;
+            double corner[12];
+            silt_cell_corners(mesh, nodes->x, cell, corner);
+            const silt_cell_shape shape = silt_cell_measure(2, corner);
+            if (shape.volume > 0 && shape.height > FIT_FLAT * silt_node_h(nodes, cell[2], size)) {
+                silt_draft_push(draft, cell, -2, shape.height / size);
+                break;
+            }
+        }
+    }
+    free(side);
+}
+
 int silt_mesh_fit_bed(silt_draft *draft, const silt_nodes *nodes, const silt_bed *bed, double size) {
+    if (draft->mesh->dim != 3) {
+        const int first = draft->mesh->n_cell;
+        fit_edges(draft, nodes, bed, size);
+        return draft->mesh->n_cell - first;
+    }
     fit f = {.draft = draft, .nodes = nodes};
     const int before = draft->mesh->n_cell;
     fit_collect(&f, bed);

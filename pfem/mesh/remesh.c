@@ -493,8 +493,6 @@ static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, u
     silt_mesh *mesh = draft->mesh;
     SILT_RESERVE(mesh->across, mesh->across_capacity, mesh->n_cell + 1);
     silt_cells_across(mesh->dim, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
-    if (mesh->dim != 3)
-        return 0;
     int flat;
     const int before = mesh->n_cell, more = bed && bed->n_cell ? silt_mesh_fit_bed(draft, nodes, bed, size) : 0;
     if (more) {
@@ -502,8 +500,10 @@ static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, u
         SILT_RESERVE(*sliver, capacity, mesh->n_cell);
         memset(*sliver + before, 0, (size_t)more);
         SILT_RESERVE(mesh->across, mesh->across_capacity, mesh->n_cell + 1);
-        silt_cells_across(3, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
+        silt_cells_across(mesh->dim, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
     }
+    if (mesh->dim != 3)
+        return 0;
     SILT_CLOCKED(heal, peel_slivers(draft, nodes, *sliver); flat = silt_mesh_heal(draft, nodes, x, size));
     return flat;
 }

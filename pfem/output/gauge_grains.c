@@ -98,8 +98,8 @@ void silt_heap_clear(silt_heap *heap) {
     *heap = (silt_heap){0};
 }
 
-// least squares through the tops of columns from x0 to x1: degrees by which it falls to the right
-static double heap_slope(const silt_heap *heap, const silt_grain_state *grains, double x0, double x1) {
+// least squares through the tops of columns from x0 to x1, in space slices across the whole heap: degrees by which it falls to the right
+static double heap_slope(const silt_heap *heap, const silt_grain_state *grains, int up, double x0, double x1) {
     double radius = 0;
     for (int i = 0; i < grains->count; i++)
         radius += grains->radius[i] / grains->count;
@@ -110,7 +110,7 @@ static double heap_slope(const silt_heap *heap, const silt_grain_state *grains, 
     for (int i = 0; i < grains->count; i++) {
         const double at = (grains->x[3 * i] - x0) / (x1 - x0) * n;
         if (heap->in[i] && at >= 0 && at < n)
-            top[(int)at] = silt_max(top[(int)at], grains->x[3 * i + 1] + grains->radius[i]);
+            top[(int)at] = silt_max(top[(int)at], grains->x[3 * i + up] + grains->radius[i]);
     }
     for (int c = 0; c < n; c++) {
         const double x = (c + 0.5) / n * (x1 - x0), y = top[c];
@@ -132,7 +132,7 @@ double silt_heap_gauge(const silt_heap *heap, const silt_view *view, const silt_
     if (!grains || grains->count == 0)
         return NAN;
     if (def->kind == GAUGE_GRAIN_SLOPE)
-        return heap_slope(heap, grains, def->from[0], def->from[1]);
+        return heap_slope(heap, grains, dim - 1, def->from[0], def->from[1]);
     for (int i = 0; i < grains->count; i++) {
         const double *x = grains->x + 3 * i, r = grains->radius[i];
         if (!heap->in[i])

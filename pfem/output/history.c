@@ -16,7 +16,7 @@ struct silt_history {
 };
 
 // a ledger column and the part of the scene that it belongs to
-typedef enum { PART_FLUID, PART_LAW, PART_BED, PART_SEEPAGE, PART_GRAINS, PART_FLOW } history_part;
+typedef enum { PART_FLUID, PART_LAW, PART_BED, PART_SEEPAGE, PART_GRAINS, PART_FEED, PART_FLOW } history_part;
 typedef struct history_column {
     const char *name;
     history_part part;
@@ -74,6 +74,7 @@ static const history_column history_ledger[] = {
     {"grain_contact_z", PART_GRAINS, offsetof(silt_ledger, grain_contact[2]), false},
     {"sediment_error", PART_GRAINS, offsetof(silt_ledger, sediment_error), false},
     {"left_mass", PART_GRAINS, offsetof(silt_ledger, left_mass), false},
+    {"fed_mass", PART_FEED, offsetof(silt_ledger, fed_mass), false},
     {"inflow_mass", PART_FLOW, offsetof(silt_ledger, inflow_mass), false},
     {"outflow_mass", PART_FLOW, offsetof(silt_ledger, outflow_mass), false},
 };
@@ -106,6 +107,12 @@ static bool history_has(const silt_scene *scene, history_part part) {
         return silt_seep_on(scene);
     case PART_GRAINS:
         return scene->grains.on;
+    case PART_FEED: {
+        bool fed = false;
+        for (int k = 0; k < scene->fluid.n_inlet; k++)
+            fed |= scene->fluid.inlet[k].grains > 0;
+        return fed;
+    }
     case PART_FLOW:
         break;
     }

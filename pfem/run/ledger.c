@@ -141,7 +141,7 @@ void silt_run_ledger(silt_run *run) {
     const double base = ledger->initial_volume + ledger->inflow_mass / rho;
     const double expected = base - ledger->outflow_mass / rho + ledger->pore_water_mass / rho;
     ledger->volume_error = scene->fluid.on && base > 0 ? (ledger->fluid_volume - expected) / base : 0;
-    const double sediment = ledger->bed_mass + ledger->grain_mass + ledger->left_mass - ledger->initial_sediment;
+    const double sediment = ledger->bed_mass + ledger->grain_mass + ledger->left_mass - ledger->fed_mass - ledger->initial_sediment;
     ledger->sediment_error = ledger->initial_sediment > 0 ? sediment / ledger->initial_sediment : 0;
 
     silt_summary *summary = &run->summary;

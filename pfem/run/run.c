@@ -251,6 +251,7 @@ static void bed_step(silt_run *run) {
     }
     bed_resolved(run);
     silt_run_release(run);
+    silt_run_feed(run, dt);
 }
 
 // what went through the bed, and room for what it has become
@@ -437,6 +438,7 @@ void silt_run_free(silt_run *run) {
     free(run->gauge);
     free(run->waiting);
     free(run->rest);
+    free(run->owed);
     free(run->freed);
     free(run->freed_area);
     free(run->grown);

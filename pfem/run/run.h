@@ -8,9 +8,10 @@
 #include "fluid.h"
 #include "output.h"
 
-/** a parcel that has left the bed but has no room yet to stand in */
+/** a parcel that has left the bed, or comes in, but has no room yet to stand in */
 typedef struct silt_waiting {
     double x[3], normal[3], reach; // patch centre, out of the bed, how far out to look
+    double v[3];                   // m/s, that it begins with
     double mass;                   // kg per m
 } silt_waiting;
 
@@ -48,6 +49,8 @@ struct silt_run {
     silt_waiting *waiting; // owned
     int n_rest, rest_capacity;
     silt_rest *rest;       // owned, rising id
+    int n_owed, owed_capacity;
+    double *owed;          // owned, kg, one per inlet: what has come due and is less than a parcel; none where nothing is fed
     int n_freed, freed_capacity;
     int (*freed)[4];       // owned, bed nodes of cells released in this step
     int freed_area_capacity;
@@ -96,6 +99,7 @@ struct silt_run {
     double *p_shown; // owned, 1 per node
     int x_old_capacity, v_old_capacity, debt_old_capacity, map_capacity, p_old_capacity, p_shown_capacity;
     double box_lo[3], box_hi[3]; // what lies outside has left
+    double way_lo[3], way_hi[3]; // what walls with a motion span from the start to the end
 };
 
 // run.c -----------------------------------------------------------------------------------------------
@@ -154,6 +158,9 @@ void silt_run_release(silt_run *run);              // after the water's step: wh
 void silt_run_place(silt_run *run);                // parcels that wait find room
 silt_status silt_run_deposit(silt_run *run, silt_error *err); // after the grains' step: what comes to rest
 void silt_run_bed_sync(silt_run *run);             // nodes on the bed's surface follow the bed
+
+// feed.c ----------------------------------------------------------------------------------------------
+void silt_run_feed(silt_run *run, double dt); // what inlets bring in dt joins the parcels that wait for room
 
 // folder.c --------------------------------------------------------------------------------------------
 /** Makes the folder, or with force clears an existing one of what silt wrote, and locks it. *lock: descriptor, -1 where the file

@@ -244,6 +244,7 @@ void silt_run_place(silt_run *run) {
     for (int k = 0; k < run->n_waiting; k++) {
         const silt_waiting *waiting = &run->waiting[k];
         silt_release release = {.mass = waiting->mass};
+        memcpy(release.v, waiting->v, sizeof release.v);
         release.radius = silt_coupling_dem.parcel_radius(run->coupling, waiting->mass);
         if (find_room(run, waiting, release.radius, n_placed, placed, release.x)) {
             SILT_RESERVE(placed, capacity, n_placed + 1);

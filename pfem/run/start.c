@@ -24,6 +24,8 @@ void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def) {
                                .log = run->log};
     memcpy(def->lo, run->box_lo, sizeof def->lo);
     memcpy(def->hi, run->box_hi, sizeof def->hi);
+    memcpy(def->way_lo, run->way_lo, sizeof def->way_lo);
+    memcpy(def->way_hi, run->way_hi, sizeof def->way_hi);
 }
 
 // everything that walls wherever they go, regions and bodies span, and room for splashes
@@ -34,39 +36,51 @@ static void box_span(double lo[3], double hi[3], const double *x, int dim, doubl
     }
 }
 
+// where they are now; only: this one of the scene, -1: all
+static void box_walls(const silt_run *run, int only, double lo[3], double hi[3]) {
+    for (int s = 0; s < run->walls.count; s++)
+        if (only >= 0 && run->walls.wall[s] != only)
+            continue;
+        else if (run->scene->dimension == 3)
+            for (int c = 0; c < 3; c++)
+                box_span(lo, hi, run->walls.corner[s][c], 3, 0);
+        else {
+            box_span(lo, hi, run->walls.from[s], 2, 0);
+            box_span(lo, hi, run->walls.to[s], 2, 0);
+        }
+}
+
 // Where walls come in the course of their motion, from row to row, with places between for those that turn: the discrete elements
 // lose what leaves the box.
-static void box_motion(silt_run *run, double lo[3], double hi[3]) {
+static void box_motion(silt_run *run, int dim, double lo[3], double hi[3]) {
     enum { BETWEEN = 16 };
     const silt_scene *scene = run->scene;
-    for (int w = 0; w < scene->n_wall && scene->dimension != 3; w++) {
+    for (int d = 0; d < dim; d++) {
+        run->way_lo[d] = HUGE_VAL;
+        run->way_hi[d] = -HUGE_VAL;
+    }
+    for (int w = 0; w < scene->n_wall; w++) {
         const silt_series *motion = &scene->wall[w].motion;
         for (int r = 0; r < BETWEEN * motion->n_row; r++) {
             const double *row = motion->value + (size_t)(r / BETWEEN) * (size_t)motion->n_column;
             const double next = r / BETWEEN + 1 < motion->n_row ? row[motion->n_column] : row[0];
             const double time = row[0] + (double)(r % BETWEEN) / BETWEEN * (next - row[0]);
             silt_walls_move(&run->walls, scene, silt_min(time, scene->time.end), 0);
-            for (int s = 0; s < run->walls.count; s++) {
-                box_span(lo, hi, run->walls.from[s], 2, 0);
-                box_span(lo, hi, run->walls.to[s], 2, 0);
-            }
+            box_walls(run, w, run->way_lo, run->way_hi);
         }
     }
     silt_walls_move(&run->walls, scene, 0, 0);
+    if (run->way_lo[0] <= run->way_hi[0]) {
+        box_span(lo, hi, run->way_lo, dim, 0);
+        box_span(lo, hi, run->way_hi, dim, 0);
+    }
 }
 
 void silt_run_box(silt_run *run) {
     const silt_scene *scene = run->scene;
     const int D = scene->dimension == 3 ? 3 : 2;
     double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-    for (int s = 0; s < run->walls.count; s++)
-        if (D == 3)
-            for (int c = 0; c < 3; c++)
-                box_span(lo, hi, run->walls.corner[s][c], D, 0);
-        else {
-            box_span(lo, hi, run->walls.from[s], D, 0);
-            box_span(lo, hi, run->walls.to[s], D, 0);
-        }
+    box_walls(run, -1, lo, hi);
     const silt_region *lists[2] = {scene->fluid.region, scene->bed.region};
     const int counts[2] = {scene->fluid.n_region, scene->bed.n_region};
     for (int l = 0; l < 2; l++)
@@ -77,7 +91,7 @@ void silt_run_box(silt_run *run) {
             box_span(lo, hi, b, D, 0);
         }
     if (silt_scene_has_dem(scene))
-        box_motion(run, lo, hi);
+        box_motion(run, D, lo, hi);
     for (int i = 0; i < run->nodes.count; i++)
         box_span(lo, hi, run->nodes.x + D * i, D, 0);
     for (int b = 0; b < scene->n_body; b++)

@@ -47,6 +47,8 @@ silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
     if (status == SILT_OK)
         status = silt_store_put(store, "sediment/rest", STORE_BYTE, (size_t)run->n_rest * sizeof *run->rest, run->rest, err);
     if (status == SILT_OK)
+        status = silt_store_put(store, "sediment/owed", STORE_BYTE, (size_t)run->n_owed * sizeof *run->owed, run->owed, err);
+    if (status == SILT_OK)
         status = silt_gauges_save(run->gauges, store, err);
     if (status == SILT_OK && run->scene->fluid.air_pressure > 0)
         status = silt_pockets_save(&run->pockets, store, err);
@@ -101,6 +103,7 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
     SILT_TRY(take_list(store, "sediment/waiting", sizeof *run->waiting, (void **)&run->waiting, &run->n_waiting,
                        &run->waiting_capacity, err));
     SILT_TRY(take_list(store, "sediment/rest", sizeof *run->rest, (void **)&run->rest, &run->n_rest, &run->rest_capacity, err));
+    SILT_TRY(take_list(store, "sediment/owed", sizeof *run->owed, (void **)&run->owed, &run->n_owed, &run->owed_capacity, err));
 
     if (scene->bed.on)
         SILT_TRY(silt_bed_load(&run->bed, &run->walls, store, err));

@@ -68,6 +68,7 @@ typedef struct silt_inlet {
     double *corner;      // owned, 3 per point
     double velocity[3];  // m/s; multiplied by column 1 of the series when there is one
     silt_series series;  // n_row 0: constant; in the scene the name of a CSV file
+    double grains;       // kg/s, 2-D per metre of width: sediment that comes in with the water; multiplied by the series too
     silt_series head;    // level over time (time, level), m, of still water behind it; n_row 0: velocity-driven
 } silt_inlet;
 
@@ -250,10 +251,12 @@ typedef struct silt_grains_def {
     silt_series sieve;    // diameter in m, share of the mass that passes, of the parcels; n_row 0: all alike
     double width;         // m, accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel, or 5 d without bed
     double kernel;        // m, width of the porosity kernel; 0: max(3 d, 2 h)
+    bool kernel_layers;   // the kernel takes means along x in layers, 2-D, default false
     double added_mass;    // 0, coefficient, of the displaced water's mass; spheres: 0.5
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false
     bool rotational_drag; // torque on the spin, default false
+    double eddy_limit;    // 0, share of grains at which eddies have no room; 0: grains do not hinder them
     bool random_walk;     // of suspended grains in the eddies, default false
     bool pick_up;         // of grains at rest too, default false
     double schmidt;       // 1, eddy viscosity over the grains' diffusivity

@@ -16,10 +16,9 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     if (scene->dimension == 3) {
         // the others were refused already
         bodies = NULL;
-        if (!fluid)
-            silt_complain(
-                reader, root,
-                "key 'fluid': found no water, allowed a scene with fluid: in three dimensions grains come with water so far");
+        if (!fluid && !grains)
+            silt_complain(reader, root,
+                          "key 'fluid': found neither water nor grains, allowed a scene with at least one of fluid, grains");
     } else if (!fluid && !grains && !has_bodies && !bodies)
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
@@ -47,6 +46,9 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
         !silt_tree_item(fluid, "cloud"))
         silt_complain_key(reader, fluid,
                           "key 'fluid.regions': found neither regions nor inlets, allowed at least one: there is no water");
+    if (scene->grains.kernel_layers && !(scene->period[0] < scene->period[1]))
+        silt_complain(reader, silt_tree_item(grains, "kernel_layers"),
+                      "key 'grains.kernel_layers': found true, allowed in a periodic scene: its means are taken along the whole of x");
     const silt_tree *regions = silt_tree_item(bed, "regions");
     if (regions && regions->kind == TREE_LIST && regions->n_item == 0)
         silt_complain(reader, regions, "key 'bed.regions': found an empty list, allowed at least one region");
@@ -490,7 +492,7 @@ static const char *const check_fixed[] = {
     "bed_y_plus", "seepage", "seepage_volume", "seepage_lost", "grain_count", "grain_mass", "grain_velocity_x",
     "grain_velocity_y", "grain_velocity_z", "grain_kinetic_energy", "grain_potential_energy", "grain_water_x",
     "grain_water_y", "grain_water_z", "grain_contact_x", "grain_contact_y", "grain_contact_z", "sediment_error",
-    "left_mass", "inflow_mass", "outflow_mass", "wall_mesh", "wall_assemble", "wall_solve", "wall_bed", "wall_dem",
+    "left_mass", "fed_mass", "inflow_mass", "outflow_mass", "wall_mesh", "wall_assemble", "wall_solve", "wall_bed", "wall_dem",
     "wall_move", "wall_output"};
 // clang-format on
 static const char *const check_of_body[] = {"x",  "y",  "z",  "vx", "vy", "vz", "qw", "qx", "qy", "qz", "wx",

@@ -171,6 +171,9 @@ static const silt_key inlet_rows[] = {
             "in with: a number, or a CSV file beside the scene with time in s, level in m"},
     {"series", KEY_SERIES, .flags = KEY_OPTIONAL, .when = ONLY(INLET_VELOCITY), AT(silt_inlet, series),
      .doc = "CSV file beside the scene: time in s, factor on the velocity"},
+    {"grains", KEY_NUMBER, .unit = "kg/s", .fallback = "0", NOT_NEGATIVE, .when = ONLY(INLET_VELOCITY), AT(silt_inlet, grains),
+     .doc = "sediment that comes in with the water (2-D: kg/s per m of width), times the factor of `series`: parcels of grains.parcel "
+            "with bed.density, at random places of the inlet; needs a bed"},
     {0}};
 TABLE(inlet, "an inlet", silt_inlet, offsetof(silt_inlet, drive));
 
@@ -458,6 +461,9 @@ static const silt_key grains_rows[] = {
      .doc = "accounting width; 0: (2/3)(0.82) d/(1 - n) of the parcel; without a bed 0.91 d with regions (n = 0.4), else 5 d"},
     {"kernel", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, kernel),
      .doc = "width of the porosity kernel; 0: the larger of 3 d and 2 h"},
+    {"kernel_layers", KEY_SWITCH, .fallback = "false", .flags = KEY_PLANE, AT(silt_grains_def, kernel_layers),
+     .doc = "the kernel takes means along the whole of x, in layers as thick as `kernel`: for level beds in periodic channels, whose water is the "
+            "same along x in the mean and changes within a grain's height over the bed"},
     {"added_mass", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, added_mass),
      .doc = "share of the displaced water that is accelerated along; spheres: 0.5"},
     {"lift", KEY_WORD, .fallback = "none", .words = lift_words, AT(silt_grains_def, lift), .doc = "force across the water's shear"},
@@ -465,6 +471,9 @@ static const silt_key grains_rows[] = {
      .doc = "force of the water's viscous stress on the grain's volume"},
     {"rotational_drag", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, rotational_drag),
      .doc = "torque of the water on grains that spin otherwise than it does"},
+    {"eddy_limit", KEY_NUMBER, .fallback = "0", .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_grains_def, eddy_limit),
+     .doc = "share of grains in the water at which eddies have no room: the mixing length counts the way to the wall times 1 - share/limit "
+            "(Li and Sawamoto 1995; 0.6); 0: grains do not hinder eddies"},
     {"random_walk", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, random_walk),
      .doc = "suspended grains wander with the eddies that the mesh does not show; random numbers by fluid.seed"},
     {"pick_up", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, pick_up),
@@ -540,7 +549,7 @@ static const silt_key gauge_rows[] = {
      .doc = "foremost x to this side of the heap: the grains that hang together, the most mass of them"},
     {"grains_height_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_GRAIN_HEIGHT, AT(silt_gauge_def, from),
      .doc = "top of the heap at this x (3-D: [x, y])"},
-    {"grains_slope", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_GRAIN_SLOPE, AT(silt_gauge_def, from),
+    {"grains_slope", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_GRAIN_SLOPE, AT(silt_gauge_def, from),
      .doc = "angle in degrees by which the top of the heap falls to the right, by least squares between these two x"},
     {"grain_place", KEY_INTEGER, .flags = KEY_CHOICE, RANGE(1, INT32_MAX), .select = GAUGE_GRAIN_PLACE, AT(silt_gauge_def, index),
      .doc = "centre of this grain, those of the list from 1, then the regions'; columns NAME_x, NAME_y, NAME_z"},

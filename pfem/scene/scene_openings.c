@@ -130,6 +130,16 @@ static void check_turn(silt_reader *reader, const silt_scene *scene, int k, cons
                       list, i);
 }
 
+// grains that are fed are parcels of the bed
+static void check_feed(silt_reader *reader, const silt_scene *scene) {
+    for (int i = 0; i < scene->fluid.n_inlet; i++)
+        if (scene->fluid.inlet[i].grains > 0 && !scene->bed.on)
+            silt_complain(reader, silt_tree_find(reader->root, "fluid.inlets.%d.grains", i),
+                          "key 'fluid.inlets.%d.grains': found %.10g in a scene without a bed, allowed with one: its density and "
+                          "grains.parcel are those of the grains",
+                          i, scene->fluid.inlet[i].grains);
+}
+
 void silt_scene_check_openings(silt_reader *reader, const silt_scene *scene, const double lo[3], const double hi[3]) {
     const silt_fluid_def *fluid = &scene->fluid;
     int n_in = fluid->n_inlet, n = n_in + fluid->n_outlet;
@@ -140,6 +150,7 @@ void silt_scene_check_openings(silt_reader *reader, const silt_scene *scene, con
         check_turn(reader, scene, i, lo, hi);
         check_level_gravity(reader, scene, i);
     }
+    check_feed(reader, scene);
     for (int i = 0; i < n_in; i++)
         check_opening(reader, "inlets", i, fluid->inlet[i].from, fluid->inlet[i].to);
     for (int i = 0; i < fluid->n_outlet; i++)

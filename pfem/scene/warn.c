@@ -20,7 +20,7 @@ static int warn_fluid(const silt_scene *scene, FILE *to) {
     const silt_fluid_def *fluid = &scene->fluid;
     const bool turbulent = fluid->flow == FLOW_TURBULENT;
     const bool eddies = fluid->turbulence == TURBULENCE_SMAGORINSKY || fluid->turbulence == TURBULENCE_WALE;
-    const bool others = scene->bed.on || scene->n_body || fluid->n_inlet || fluid->n_outlet;
+    const bool others = scene->bed.on || scene->n_body > 0 || fluid->n_inlet || fluid->n_outlet;
     int n_smooth = 0, n_pulled = 0, count = 0;
     for (int i = 0; i < scene->n_wall; i++) {
         const silt_wall *wall = &scene->wall[i];
