@@ -39,7 +39,7 @@ awk '
 gnuplot <<EOF
 set terminal svg size 900,400 background 'white'; set output '$picture'; set datafile separator ','
 set multiplot layout 1,2
-set key top left; set grid; set xlabel 'nodes'; set ylabel 'seconds of processor a step'; set xtics rotate by -30
+set key top left; set grid; set xlabel 'nodes'; set ylabel 'seconds of processor a step'; set format x '%.0s%c'
 plot for [k = 2:5] '$work/phases.csv' using 1:k with linespoints pt k title columnheader(k)
 set ylabel 'share of a step, %'; set logscale x; set yrange [0:60]; set key top right
 plot for [k = 2:5] '$work/phases.csv' using 1:(100 * column(k) / (\$2 + \$3 + \$4 + \$5)) with linespoints pt k title columnheader(k)

@@ -95,7 +95,7 @@ static double last(const char *out, const char *name) {
 static const char out[] = "test_suspension.out";
 
 static void suspension_run(const suspension *s) {
-    const char *const path = "test_suspension.yaml";
+    const char *const path = SILT_BINARY "/test_suspension.yaml";
     silt_scene *scene = NULL;
     suspension_write(s, path);
     OK(silt_scene_read(path, 0, NULL, &scene, &error));

@@ -34,7 +34,7 @@ typedef struct basin {
 } basin;
 
 static void basin_open_as(basin *b, const char *box, int count, int seed, double diameter, bool periodic) {
-    FILE *to = fopen("test_walk.yaml", "w");
+    FILE *to = fopen(SILT_BINARY "/test_walk.yaml", "w");
     assert_non_null(to);
     fprintf(to, "silt: 1\ntitle: walk\ndimension: 2\n%stime: {end: 1, output: 1}\ngravity: [0, 0]\nfluid:\n  density: 1000\n  viscosity: 1.0e-3\n"
                 "  size: 0.005\n  seed: %d\n  regions: [{box: [[0, 0], [0.1, 0.1]]}]\n"
@@ -48,7 +48,7 @@ static void basin_open_as(basin *b, const char *box, int count, int seed, double
             box, diameter, count);
     fclose(to);
     memset(b, 0, sizeof *b);
-    OK(silt_scene_read("test_walk.yaml", 0, NULL, &b->scene, &error));
+    OK(silt_scene_read(SILT_BINARY "/test_walk.yaml", 0, NULL, &b->scene, &error));
     OK(silt_walls_create(&b->walls, b->scene, &error));
     silt_nodes_seed(&b->nodes, b->scene, &b->walls, NULL, NULL);
     const silt_barrier barrier = {.walls = &b->walls};
