@@ -11,19 +11,7 @@
 
 #include <cmocka.h>
 
-static silt_error error;
-
-#define OK(call)                                                                                                       \
-    do {                                                                                                               \
-        error = (silt_error){0};                                                                                       \
-        if ((call) != SILT_OK)                                                                                         \
-            fail_msg("%s: %s", #call, error.text);                                                                     \
-    } while (0)
-
-static void near(double value, double expected, double tolerance, const char *what) {
-    if (!(fabs(value - expected) <= tolerance))
-        fail_msg("%s: %.17g, expected %.17g within %g", what, value, expected, tolerance);
-}
+#include "check.h"
 
 // ---------------------------------------------------------------- a tank of water, jittered
 

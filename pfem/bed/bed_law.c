@@ -390,7 +390,7 @@ int silt_bed_due(const silt_bed *bed, const silt_scene *scene, int capacity, int
 // ---------------------------------------------------------------- what deposition asks
 
 double silt_bed_shear_at(const silt_bed *bed, const double *x) {
-    const int dim = bed->dim == 3 ? 3 : 2;
+    const int dim = bed_dim(bed);
     double nearest = HUGE_VAL, shear = 0;
     for (int k = 0; k < bed->n_node; k++) {
         double way = 0;
@@ -416,7 +416,7 @@ static int room_compare(const void *a, const void *b) {
 
 // cells with pores to spare within reach of x, the nearest first; @return kg/m that they take
 static double room_list(const silt_bed *bed, const silt_scene *scene, const double *x, double reach, double porosity, int *n, bed_room *list) {
-    const int dim = bed->dim == 3 ? 3 : 2;
+    const int dim = bed_dim(bed);
     double sum = 0;
     *n = 0;
     for (int c = 0; c < bed->n_cell; c++) {

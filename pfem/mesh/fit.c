@@ -34,6 +34,20 @@ static int compare_three(const void *p, const void *q) {
     return 0;
 }
 
+// the first of n sorted records of three numbers that is not before from, to, -1
+static int first_from(int n, const void *record, int from, int to) {
+    const int(*all)[3] = record, key[3] = {from, to, -1};
+    int lo = 0, hi = n;
+    while (lo < hi) {
+        const int middle = (lo + hi) / 2;
+        if (compare_three(all[middle], key) < 0)
+            lo = middle + 1;
+        else
+            hi = middle;
+    }
+    return lo;
+}
+
 // free facets at the bed, and which of the bed's faces are facets of the water
 static void fit_collect(fit *f, const silt_bed *bed) {
     const silt_mesh *mesh = f->draft->mesh;
@@ -81,29 +95,13 @@ static void fit_collect(fit *f, const silt_bed *bed) {
 
 // the first free facet that has from -> to, or -1
 static int fit_first(const fit *f, int from, int to) {
-    int lo = 0, hi = f->n_rim;
-    const int key[3] = {from, to, -1};
-    while (lo < hi) {
-        const int middle = (lo + hi) / 2;
-        if (compare_three(&f->rim[middle], key) < 0)
-            lo = middle + 1;
-        else
-            hi = middle;
-    }
+    const int lo = first_from(f->n_rim, f->rim, from, to);
     return lo < f->n_rim && f->rim[lo].from == from && f->rim[lo].to == to ? lo : -1;
 }
 
 // the missing face that has from -> to, or -1
 static int fit_neighbour(const fit *f, int from, int to) {
-    int lo = 0, hi = f->n_side;
-    const int key[3] = {from, to, -1};
-    while (lo < hi) {
-        const int middle = (lo + hi) / 2;
-        if (compare_three(&f->side[middle], key) < 0)
-            lo = middle + 1;
-        else
-            hi = middle;
-    }
+    const int lo = first_from(f->n_side, f->side, from, to);
     return lo < f->n_side && f->side[lo].from == from && f->side[lo].to == to ? f->side[lo].face : -1;
 }
 
@@ -166,22 +164,8 @@ static int free_sides(const silt_mesh *mesh, int (**side)[3]) {
     return n;
 }
 
-// the first of the sides that is not before from -> to
-static int side_first(int n, const int (*side)[3], int from, int to) {
-    int lo = 0, hi = n;
-    const int key[3] = {from, to, 0};
-    while (lo < hi) {
-        const int middle = (lo + hi) / 2;
-        if (compare_three(side[middle], key) < 0)
-            lo = middle + 1;
-        else
-            hi = middle;
-    }
-    return lo;
-}
-
 static bool side_there(int n, const int (*side)[3], int from, int to) {
-    const int k = side_first(n, side, from, to);
+    const int k = first_from(n, side, from, to);
     return k < n && side[k][0] == from && side[k][1] == to;
 }
 
@@ -194,7 +178,7 @@ static void fit_edges(silt_draft *draft, const silt_nodes *nodes, const silt_bed
         const int from = bed->fluid_node[bed->edge[k][0]], to = bed->fluid_node[bed->edge[k][1]];
         if (from < 0 || to < 0 || side_there(n, side, from, to))
             continue;
-        for (int m = side_first(n, side, from, -1); m < n && side[m][0] == from; m++) {
+        for (int m = first_from(n, side, from, -1); m < n && side[m][0] == from; m++) {
             const int cell[4] = {from, to, side[m][1], -1}, last[3] = {side[m][1], to, -1};
             if (cell[2] == to || !(side_there(n, side, cell[2], to) || silt_facet_kind_of(mesh, nodes, last) == FACET_WALL))
                 continue;

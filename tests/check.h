@@ -1,0 +1,23 @@
+/** @file check.h
+ * What tests of whole parts ask all the time; after cmocka.h. A failure is told with what was called, or both numbers.
+ */
+#ifndef SILT_CHECK_H
+#define SILT_CHECK_H
+
+#include "base.h"
+
+static silt_error error;
+
+#define OK(call)                                                                                                       \
+    do {                                                                                                               \
+        error = (silt_error){0};                                                                                       \
+        if ((call) != SILT_OK)                                                                                         \
+            fail_msg("%s: %s", #call, error.text);                                                                     \
+    } while (0)
+
+static void near(double value, double expected, double tolerance, const char *what) {
+    if (!(fabs(value - expected) <= tolerance))
+        fail_msg("%s: %.17g, expected %.17g within %g", what, value, expected, tolerance);
+}
+
+#endif
