@@ -59,10 +59,10 @@ static silt_status coupling_shapes(silt_coupling *c, silt_error *err) {
         state->q[0] = cos(def->angle * M_PI / 360.0);
         state->q[3] = sin(def->angle * M_PI / 360.0);
         state->mass = def->density * body->shape.area;
-        state->inertia = def->density * body->shape.inertia;
-        state->area = body->shape.area;
+        state->inertia[2] = def->density * body->shape.inertia;
+        state->volume = body->shape.area;
         state->n_point = body->shape.n_point;
-        state->outline = body->shape.point;
+        state->point = body->shape.point;
     }
     return SILT_OK;
 }
@@ -629,7 +629,7 @@ static silt_status coupling_send_bodies(silt_coupling *c, silt_error *err) {
         silt_dem_body body = {.n_sphere = clump->n_sphere,
                               .sphere = clump->sphere,
                               .mass = b->mass * c->width,
-                              .inertia = b->inertia * c->width,
+                              .inertia = b->inertia[2] * c->width,
                               .angle = 2.0 * atan2(b->q[3], b->q[0]),
                               .fixed = c->body[i].fixed};
         memcpy(body.x, b->x, sizeof body.x);

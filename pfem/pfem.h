@@ -386,10 +386,14 @@ typedef struct silt_body_state {
         double x[3], v[3], q[4], w[3]; // centroid, velocity, orientation (w, x, y, z), angular velocity
         double force[3], torque[3];    // of the water, N and N m per m of width, last step
         double contact[3];             // of contacts, mean of the last step
-        double mass, inertia;          // kg and kg m2 per m of width (about z)
-        double area;                   // m2, of the outline
+        double mass;                   // kg
+        double inertia[6];             // kg m2 about the centroid in the body's frame: xx, yy, zz, xy, xz, yz; in 2-D zz alone counts
+        double volume;                 // m3; 2-D: m2
         int n_point;
-        const double *outline;         // 2 per point, counter-clockwise in the body's frame about the centroid, borrowed
+        const double *point;           // of the surface, dim each, in the body's frame about the centroid, borrowed; in 2-D in order,
+                                       // counter-clockwise
+        int n_face;
+        const int (*face)[3];          // 3-D: triangles of points, counter-clockwise from outside, borrowed
     } *body; // owned by the coupling
 } silt_body_state;
 

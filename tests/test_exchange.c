@@ -1135,7 +1135,7 @@ static void test_body_on_the_bed(void **unused) {
     silt_body_state *bodies = dem->bodies(b.coupling);
     assert_int_equal(bodies->count, 1);
     near(bodies->body[0].mass, 80, 1e-12, "mass per metre");
-    near(bodies->body[0].inertia, 80 * 0.08 / 12, 1e-12, "inertia per metre");
+    near(bodies->body[0].inertia[2], 80 * 0.08 / 12, 1e-12, "inertia per metre");
     assert_int_equal(dem->outline(b.coupling, 0, 0.1, NULL, 0), 8);
     assert_false(dem->room(b.coupling, (double[2]){0.5, 0.22}, 0.02));
     assert_true(dem->room(b.coupling, (double[2]){0.5, 0.235}, 0.02));

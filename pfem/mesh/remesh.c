@@ -26,7 +26,7 @@ bool silt_barrier_contains(const silt_barrier *barrier, const double *point) {
         // into the body's frame: turned back about z
         const double c = 1 - 2 * body->q[3] * body->q[3], s = 2 * body->q[0] * body->q[3];
         const double dx = point[0] - body->x[0], dy = point[1] - body->x[1];
-        if (polygon_contains(body->n_point, body->outline, c * dx + s * dy, -s * dx + c * dy))
+        if (polygon_contains(body->n_point, body->point, c * dx + s * dy, -s * dx + c * dy))
             return true;
     }
     return false;

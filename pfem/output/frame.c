@@ -354,8 +354,8 @@ static silt_status frame_bodies(const char *out, int number, const silt_view *vi
         const struct silt_body *b = &bodies->body[i];
         double c = 1 - 2 * b->q[3] * b->q[3], s = 2 * b->q[0] * b->q[3];
         for (int k = 0; k < b->n_point; k++, used++) {
-            x[3 * used] = b->x[0] + c * b->outline[2 * k] - s * b->outline[2 * k + 1];
-            x[3 * used + 1] = b->x[1] + s * b->outline[2 * k] + c * b->outline[2 * k + 1];
+            x[3 * used] = b->x[0] + c * b->point[2 * k] - s * b->point[2 * k + 1];
+            x[3 * used + 1] = b->x[1] + s * b->point[2 * k] + c * b->point[2 * k + 1];
             link[used] = used;
         }
         memcpy(v + 3 * i, b->v, sizeof b->v);

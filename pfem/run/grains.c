@@ -35,8 +35,8 @@ silt_status silt_run_loads_sane(const silt_run *run, silt_error *err) {
         if (scene->body[b].motion == MOTION_FIXED || !water_on_body(run, b, force, &torque))
             continue;
         for (int k = 0; k < body->n_point; k++)
-            reach = silt_max(reach, hypot(body->outline[2 * k], body->outline[2 * k + 1]));
-        const double way = silt_square(run->dt) * (silt_length(2, force) / body->mass + fabs(torque) * reach / body->inertia);
+            reach = silt_max(reach, hypot(body->point[2 * k], body->point[2 * k + 1]));
+        const double way = silt_square(run->dt) * (silt_length(2, force) / body->mass + fabs(torque) * reach / body->inertia[2]);
         if (!(way < scene->fluid.size))
             return silt_fail(err, SILT_FAILED, "the water's force (%.3g, %.3g) N and torque %.3g N m would throw body '%s' at (%g, %g) over %.2g cells in a step",
                              force[0], force[1], torque, scene->body[b].name, body->x[0], body->x[1], way / scene->fluid.size);
@@ -66,10 +66,10 @@ static void load_bodies(silt_run *run, double before, bool again) {
         double force[2], torque, reach = 0;
         const bool wet = water_on_body(run, b, force, &torque);
         for (int k = 0; k < body->n_point; k++)
-            reach = silt_max(reach, hypot(body->outline[2 * k], body->outline[2 * k + 1]));
+            reach = silt_max(reach, hypot(body->point[2 * k], body->point[2 * k + 1]));
         // added mass and inertia: those of the disc around it
         const double added = rho * M_PI * silt_square(reach), turned = 0.25 * added * silt_square(reach);
-        const double share = most / (1 + ratio * added / body->mass), twist = most / (1 + ratio * turned / body->inertia);
+        const double share = most / (1 + ratio * added / body->mass), twist = most / (1 + ratio * turned / body->inertia[2]);
         for (int d = 0; d < 2; d++)
             body->force[d] = wet ? body->force[d] + share * (force[d] - body->force[d]) : 0;
         body->torque[2] = wet ? body->torque[2] + twist * (torque - body->torque[2]) : 0;
