@@ -1,6 +1,7 @@
 /* silt-dem: the program that links LIGGGHTS. Started by silt (dem.c) with a socket, the shared memory and a restart
  * file open; it does one instruction after the other until it is told to end or its parent is gone. */
 #define _GNU_SOURCE
+#include "response.h"
 #include "script.h"
 #include "touch.h"
 
@@ -355,6 +356,7 @@ static void worker_open(void) {
         worker_fail("LIGGGHTS does not start");
     worker.plane = worker_grow(worker.plane, (size_t)(s->n_wall + s->n_triangle), sizeof *worker.plane);
     script_open(worker.lmp, s, worker_path(DEM_FD_RESTART), worker.plane);
+    response_open(worker.lmp);
     if (s->resume) {
         worker_body_table();
         script_integrate(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
@@ -500,12 +502,14 @@ static void worker_run(void) {
     if (s->n_step > 0) {
         worker_load();
         script_motion(worker.lmp, s);
+        response_begin(worker.lmp, s);
     }
     // the multisphere bodies' sums of forces cannot be reached: they are set up for every run (ten thousand grains: 5 ms)
     if (!worker.settled && (s->n_step > 0 || s->n_remove || s->n_add))
         worker_set_up();
     if (s->n_step > 0)
         worker_advance(s->n_step);
+    response_end();
     worker_answer();
 }
 
