@@ -484,8 +484,11 @@ static void coupling_add(silt_coupling *c) {
         silt_dem_add(c->dem, n, c->add);
 }
 
-static void coupling_keep(silt_coupling *c) {
-    silt_dem_keep(c->dem);
+static void coupling_keep(silt_coupling *c) { silt_dem_keep(c->dem); }
+
+static void coupling_respond(silt_coupling *c, int size, const double *matrix) {
+    c->responds = size > 0;
+    silt_dem_respond(c->dem, matrix);
 }
 
 static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
@@ -600,10 +603,14 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
         memcpy(b->v, state->body_v + 3 * i, sizeof b->v);
         memcpy(b->w, state->body_omega + 3 * i, sizeof b->w);
         memcpy(b->q, state->body_q + 4 * i, sizeof b->q);
-        for (int k = 0; k < 3 && c->elapsed > 0.0; k++)
-            b->contact[k] =
-                b->mass * ((b->v[k] - c->body[i].old_v[k]) / c->elapsed - c->scene->gravity[k]) - b->force[k];
+        for (int k = 0; k < 3 && c->elapsed > 0.0; k++) {
+            b->force[k] += c->responds ? state->body_answer[6 * i + k] / c->width : 0.0;
+            b->torque[k] += c->responds ? state->body_answer[6 * i + 3 + k] / c->width : 0.0;
+            b->contact[k] = c->responds && !c->body[i].fixed ? state->body_contact[6 * i + k] / c->width
+                                      : b->mass * ((b->v[k] - c->body[i].old_v[k]) / c->elapsed - c->scene->gravity[k]) - b->force[k];
+        }
     }
+    c->responds = false;
     return SILT_OK;
 }
 
@@ -774,6 +781,7 @@ const silt_coupling_type silt_coupling_dem = {
     .bodies = coupling_bodies,
     .prepare = coupling_prepare,
     .load = coupling_load,
+    .respond = coupling_respond,
     .walk = silt_coupling_walk,
     .exchanged = coupling_exchanged,
     .outline = coupling_outline,

@@ -128,6 +128,19 @@ static void water_restore(silt_run *run) {
     silt_stiff_forget(run->fluid.stiff);
 }
 
+static silt_step water_see(silt_run *run) {
+    const silt_scene *scene = run->scene;
+    silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
+                      .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
+                      .seep = silt_seep_on(scene) ? &run->seep : NULL,
+                      .nodes = &run->nodes, .time = run->time, .dt = run->dt};
+    if (silt_run_bodies_free(run)) {
+        step.body_velocity = run->body_velocity;
+        step.body_shift = run->body_shift;
+    }
+    return step;
+}
+
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
     const silt_scene *scene = run->scene;
     water_keep(run);
@@ -144,17 +157,16 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
             return status;
         }
         run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
-        const silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
-                                .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
-                                .seep = silt_seep_on(scene) ? &run->seep : NULL,
-                                .nodes = &run->nodes, .time = run->time, .dt = run->dt};
+        if (scene->n_body)
+            silt_run_bodies_coast(run);
+        const silt_step step = water_see(run);
         silt_clock_to(CLOCK_assemble);
         status = silt_fluid_step(&run->fluid, &step, err);
         silt_clock_to(CLOCK_rest);
-        if (status == SILT_OK)
-            status = silt_run_loads_sane(run, err);
+        if (status == SILT_OK && scene->n_body)
+            SILT_CLOCKED(coupling, status = silt_run_bodies_load(run, &step, err));
         if (status == SILT_OK) {
-            if (silt_seep_on(scene))
+            if (silt_seep_on(scene) && !silt_run_bodies_free(run))
                 silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
             return SILT_OK;
         }
@@ -303,12 +315,21 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         SILT_CLOCKED(coupling, {
             if (attempt == 0)
                 silt_run_place(run);
-            status = silt_run_grains(run, (int)n, before, attempt > 0, err);
+            status = silt_run_grains(run, (int)n, attempt > 0, err);
         });
         if (status == SILT_OK)
             break;
         if (!grains_again(run, &n, attempt, err))
             return silt_run_grains_failed(run, status, err);
+    }
+    if (scene->fluid.on && silt_run_bodies_free(run)) {
+        const silt_step step = water_see(run);
+        silt_clock_to(CLOCK_assemble);
+        status = silt_run_bodies_answer(run, &step, err);
+        silt_clock_to(CLOCK_rest);
+        SILT_TRY(status);
+        if (silt_seep_on(scene))
+            silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
     }
     if (run->coupling && scene->bed.on)
         SILT_CLOCKED(bed, status = silt_run_deposit(run, err));
@@ -444,7 +465,10 @@ void silt_run_free(silt_run *run) {
     free(run->grown);
     free(run->grown_area);
     free(run->body_before);
-    free(run->body_load);
+    free(run->body_after);
+    free(run->body_velocity);
+    free(run->body_shift);
+    free(run->body_carry);
     free(run->x_old);
     free(run->p_old);
     free(run->p_shown);
