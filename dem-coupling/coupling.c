@@ -488,7 +488,9 @@ static void coupling_keep(silt_coupling *c) { silt_dem_keep(c->dem); }
 
 static void coupling_respond(silt_coupling *c, int size, const double *matrix) {
     c->responds = size > 0;
-    silt_dem_respond(c->dem, matrix);
+    SILT_RESERVE(c->response, c->response_capacity, size * size + 1);
+    memcpy(c->response, matrix, (size_t)size * (size_t)size * sizeof *matrix);
+    silt_dem_respond(c->dem, c->response);
 }
 
 static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
@@ -722,7 +724,7 @@ static void coupling_close(silt_coupling **coupling) {
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
                      c->body,     c->body_force, c->body_torque, c->force, c->add,    c->torque,
                      c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate,
-                     c->eddy,     c->shift,      c->walk};
+                     c->eddy,     c->shift,      c->walk,          c->response};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);

@@ -92,6 +92,8 @@ struct silt_coupling {
     double *torque;       // owned, 3 per grain, N m; NULL where the water exerts none
     silt_dem_sphere *add; // owned
     bool responds;        // the running substeps answer contacts of bodies
+    double *response;     // owned, how
+    int response_capacity;
     double elapsed;       // s, of the running substeps
     double contact[3];    // N/m, of contacts on all grains, of the last substeps
     double left_mass, left_rest; // and what rounding left out of it (silt_sum)

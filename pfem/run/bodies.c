@@ -435,8 +435,8 @@ silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_er
             run->body_error = silt_max(run->body_error, silt_length(3, off) / size);
         for (int d = 0; d < 3; d++) {
             double *carry = run->body_carry[b];
-            carry[d] = fixed ? 0 : run->dt * (force[ROW * b + d] - body->force[d]) ;
-            carry[3 + d] = fixed ? 0 : run->dt * (force[ROW * b + 3 + d] - body->torque[d]);
+            carry[d] = fixed ? 0 : carry[d] + run->dt * (force[ROW * b + d] - body->force[d]);
+            carry[3 + d] = fixed ? 0 : carry[3 + d] + run->dt * (force[ROW * b + 3 + d] - body->torque[d]);
             body->force[d] = force[ROW * b + d];
             body->torque[d] = force[ROW * b + 3 + d];
         }
