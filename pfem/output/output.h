@@ -73,6 +73,8 @@ silt_status silt_history_create(silt_history **history, const char *out, const s
 /** opens an existing history.csv, cuts rows with step > last away, goes on behind it */
 silt_status silt_history_reopen(silt_history **history, const char *out, const silt_scene *scene, int64_t last, silt_error *err);
 silt_status silt_history_row(silt_history *history, const silt_view *view, const double *gauge, silt_error *err);
+/** a column of the row that the view has, by its name; NaN where there is no such column */
+double silt_history_value(silt_history *history, const silt_view *view, const double *gauge, const char *column);
 /** forces the rows to the disk; before a checkpoint is committed, so that no checkpoint is ahead of its history */
 silt_status silt_history_sync(silt_history *history, silt_error *err);
 silt_status silt_history_close(silt_history **history, silt_error *err);
@@ -139,8 +141,6 @@ silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_ch
 /** Copies the files that the scene reads (references, series, surfaces, outlines, clouds) into OUT and writes OUT/scene.yaml: the resolved scene,
  * which names the copies, so that OUT can be verified, resumed and run again anywhere. */
 silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err);
-/** Holds OUT against the checks of OUT/scene.yaml; prints a line a check to `to`. SILT_FAILED when one fails. */
-silt_status silt_verify(const char *out, FILE *to, silt_error *err);
 /** PNG pictures of frames: frame -1 all, -2 the last; field: mesh, pressure, speed, elevation, vorticity, porosity, bed (NULL:
  * speed); slice: "y=0.5" for a plane cut through three dimensions, NULL: none; written as TO/picture_NNNNNN.png (NULL: OUT) */
 silt_status silt_draw(const char *out, int frame, const char *field, const char *slice, const char *to, FILE *say,
