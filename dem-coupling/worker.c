@@ -497,13 +497,16 @@ static void worker_run(void) {
         script_add(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
     if (s->n_remove || s->n_add || worker.n_body || !s->keep)
         worker.settled = 0;
-    if (s->n_step > 0) {
+    const bool setting = !worker.settled && (s->n_step > 0 || s->n_remove || s->n_add);
+    if (s->n_step > 0)
         worker_load();
-        script_motion(worker.lmp, s);
-    }
+    if (setting || s->n_step > 0)
+        script_motion(worker.lmp, s, setting ? 0 : 1);
     // the multisphere bodies' sums of forces cannot be reached: they are set up for every run (ten thousand grains: 5 ms)
-    if (!worker.settled && (s->n_step > 0 || s->n_remove || s->n_add))
+    if (setting)
         worker_set_up();
+    if (setting && s->n_step > 0)
+        script_motion(worker.lmp, s, 1);
     if (s->n_step > 0)
         worker_advance(s->n_step);
     worker_answer();
