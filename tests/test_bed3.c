@@ -484,7 +484,7 @@ static double rain(bench3 *b, uint64_t *seed, int n, double r, int count[3]) {
         for (int d = 0; d < 2; d++)
             x[d] = silt_clamp(x[d], r, (d ? 0.4 : 1) - r);
         silt_deposit deposit;
-        count[silt_bed_deposit(&b->bed, &b->scene, x, r, mass, &deposit)]++;
+        count[silt_bed_deposit(&b->bed, &b->scene, x, r, mass, NULL, &deposit)]++;
         taken += deposit.kind == DEPOSIT_REFUSED ? 0 : mass;
         NEAR(b->bed.solid_mass, initial + taken, 1e-12 * initial);
         NEAR(pores3(b) + b->bed.pore_water, water, 1e-12 * water);
@@ -521,8 +521,8 @@ static void test_deposit(void **state) {
         assert_true(volume_of(&b.bed) > volume);
         // too high, and in the bed
         silt_deposit deposit;
-        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[]){0.5, 0.2, 0.9}, 0.02, 0.01, &deposit), DEPOSIT_REFUSED);
-        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[]){0.5, 0.2, 0.1}, 0.02, 0.01, &deposit), DEPOSIT_REFUSED);
+        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[]){0.5, 0.2, 0.9}, 0.02, 0.01, NULL, &deposit), DEPOSIT_REFUSED);
+        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[]){0.5, 0.2, 0.1}, 0.02, 0.01, NULL, &deposit), DEPOSIT_REFUSED);
         // all of it away again
         double released = 0;
         while (b.bed.n_cell > 0) {

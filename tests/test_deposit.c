@@ -17,7 +17,7 @@ static void drop_parcels(bench *b, int n, double lo, double hi, double r, double
         const double solid = b->bed.solid_mass, pores = b->bed.pore_water, pores_rest = b->bed.pore_rest, area = bed_area(&b->bed);
         const int64_t revision = b->bed.revision;
         silt_deposit deposit = {0};
-        count[silt_bed_deposit(&b->bed, &b->scene, at, r, mass, &deposit)]++;
+        count[silt_bed_deposit(&b->bed, &b->scene, at, r, mass, NULL, &deposit)]++;
         if (deposit.kind != DEPOSIT_REFUSED)
             taken += mass;
         NEAR(b->bed.solid_mass - solid, deposit.kind == DEPOSIT_REFUSED ? 0 : mass, 1e-13 * initial);
@@ -69,9 +69,9 @@ static void test_deposit(void **state) {
 
         // far away, or inside: refused
         silt_deposit deposit = {0};
-        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[2]){0.5, 0.95}, 0.01, mass, &deposit),
+        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[2]){0.5, 0.95}, 0.01, mass, NULL, &deposit),
                          DEPOSIT_REFUSED);
-        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[2]){0.5, 0.05}, 0.01, mass, &deposit),
+        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[2]){0.5, 0.05}, 0.01, mass, NULL, &deposit),
                          DEPOSIT_REFUSED);
 
         // what was deposited erodes again, to the last cell
@@ -126,7 +126,7 @@ static void test_deposit_erode_mixed(void **state) {
             const double x = silt_uniform(&seed), up = 0.5 * d + 0.3 * 0.05 * silt_uniform(&seed);
             silt_deposit deposit = {0};
             const double level = silt_bed_level(&b.bed, (double[]){x});
-            if (level > 0 && silt_bed_deposit(&b.bed, &b.scene, (double[2]){x, level + up}, 0.5 * d, parcel, &deposit))
+            if (level > 0 && silt_bed_deposit(&b.bed, &b.scene, (double[2]){x, level + up}, 0.5 * d, parcel, NULL, &deposit))
                 outside -= parcel;
             count[deposit.kind]++;
         }
@@ -179,7 +179,7 @@ static void bench_step(bench *b, uint64_t *seed) {
     const double x = silt_uniform(seed), level = silt_bed_level(&b->bed, (double[]){x});
     silt_deposit deposit = {0};
     if (level > 0)
-        silt_bed_deposit(&b->bed, &b->scene, (double[2]){x, level + 0.02}, 0.0075, 0.3, &deposit);
+        silt_bed_deposit(&b->bed, &b->scene, (double[2]){x, level + 0.02}, 0.0075, 0.3, NULL, &deposit);
 }
 
 static void test_save_load(void **state) {
