@@ -101,3 +101,13 @@ char *silt_worker_find(const char *asked) {
     }
     return silt_text("%s/silt-dem", self);
 }
+
+void silt_folder_remove(const char *path) {
+    DIR *folder = opendir(path);
+    for (struct dirent *entry; folder && (entry = readdir(folder));)
+        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
+            unlinkat(dirfd(folder), entry->d_name, 0);
+    if (folder)
+        closedir(folder);
+    rmdir(path);
+}
