@@ -79,6 +79,10 @@ double silt_history_value(silt_history *history, const silt_view *view, const do
 silt_status silt_history_sync(silt_history *history, silt_error *err);
 silt_status silt_history_close(silt_history **history, silt_error *err);
 
+/** index of a name in the header line, -1: absent; the number of a row in that column, NaN: none (verify.c) */
+int silt_history_find(const char *header, const char *name);
+double silt_history_number(const char *row, int column);
+
 // frame.c ------------------------------------------------------------------------------------------
 /** writes fluid_NNNNNN.hdf etc., the .series indices, run.h5 and a line of run.log */
 silt_status silt_frame_write(const char *out, int number, const silt_view *view, silt_error *err);
@@ -120,6 +124,11 @@ typedef struct silt_summary {
     int64_t steps, retries, iterations, most_iterations;
 } silt_summary;
 silt_status silt_summary_write(const char *out, const silt_view *view, const silt_summary *summary, silt_error *err);
+struct fy_document; // of libfyaml
+/** OUT/summary.json, NULL: none; to be freed with fy_document_destroy. Values at a path like "/checks/0/error": "" and 0 where there is none */
+struct fy_document *silt_summary_read(const char *out);
+const char *silt_summary_text(struct fy_document *summary, const char *key);
+double silt_summary_number(struct fy_document *summary, const char *key);
 /** a text in quotes or null; a name with its number (NaN and infinity: null) and what follows it */
 void silt_json_text(FILE *to, const char *text);
 void silt_json_number(FILE *to, const char *name, double value, const char *end);

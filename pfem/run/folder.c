@@ -106,3 +106,13 @@ char *silt_worker_find(const char *asked) {
     self[n > 0 ? n : 0] = 0;
     return worker_near(self);
 }
+
+void silt_folder_remove(const char *path) {
+    DIR *folder = opendir(path);
+    for (struct dirent *entry; folder && (entry = readdir(folder));)
+        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
+            unlinkat(dirfd(folder), entry->d_name, 0);
+    if (folder)
+        closedir(folder);
+    rmdir(path);
+}

@@ -175,6 +175,7 @@ void silt_run_feed(silt_run *run, double dt); // what inlets bring in dt joins t
 silt_status silt_folder_prepare(const char *out, bool force, int *lock, silt_error *err);
 /** one run at a time in a folder; the lock ends with the process at the latest */
 silt_status silt_folder_lock(const char *out, int *lock, silt_error *err);
+void silt_folder_remove(const char *path); // the folder and the files in it
 char *silt_folder_default(const silt_scene *scene); // the scene's folder name plus .out, in the current folder; owned by the caller
 char *silt_worker_find(const char *asked);          // path of silt-dem; owned by the caller
 
