@@ -69,8 +69,8 @@ static void report_run(const silt_report_page *r, const silt_table *table, const
                    silt_summary_number(summary, "/machine/threads"), silt_summary_text(summary, "/machine/system"));
     if (*silt_summary_text(summary, "/ended"))
         report_row(r->to, "ended", "%s", silt_summary_text(summary, "/ended"));
-    report_row(r->to, "program", "silt %s; scene %016llx", summary ? silt_summary_text(summary, "/version") : SILT_VERSION,
-               (unsigned long long)r->scene->hash);
+    if (summary)
+        report_row(r->to, "program", "silt %s; scene %s", silt_summary_text(summary, "/version"), silt_summary_text(summary, "/scene_hash"));
     fputs("</table>\n", r->to);
     silt_summary_close(summary);
 }

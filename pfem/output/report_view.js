@@ -183,10 +183,11 @@
         return group;
     }
 
-    var makers = {water: water, drops: drops, bed: bed, grains: grains, bodies: bodies, walls: walls};
     function bed(part) {
         return solid(part, ink.sand, ink.sandEdge, 1, {});
     }
+
+    var makers = {water: water, drops: drops, bed: bed, grains: grains, bodies: bodies, walls: walls};
 
     // ---------------------------------------------------------------- stage
 
@@ -203,8 +204,10 @@
     var scene = new THREE.Scene(), lo = new THREE.Vector3().fromArray(data.room[0]), hi = new THREE.Vector3().fromArray(data.room[1]);
     var middle = lo.clone().add(hi).multiplyScalar(0.5), size = hi.clone().sub(lo), reach = size.length();
     scene.background = new THREE.Color(0xf7f8f9);
-    scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8f96, 0.75));
-    var sun = new THREE.DirectionalLight(0xffffff, 0.45);
+    var sky = new THREE.HemisphereLight(0xffffff, 0xb4b8bd, 0.85);
+    sky.position.set(0, 0, 1);
+    scene.add(sky);
+    var sun = new THREE.DirectionalLight(0xffffff, 0.3);
     sun.position.set(0.25, -0.45, 0.9);
     scene.add(sun);
     var camera = space ? new THREE.PerspectiveCamera(32, 1, 0.01 * reach, 20 * reach) : new THREE.OrthographicCamera(-1, 1, 1, -1, 0.1, 10);
@@ -231,10 +234,14 @@
         camera.zoom = 1;
         if (space) {
             camera.up.set(0, 0, 1);
-            // from the front, the right and above, as the pictures are; as far off as the room's width and height need
-            var half = Math.tan(0.5 * camera.fov * Math.PI / 180);
-            var far = Math.max(0.55 * Math.hypot(size.x, size.y) / (half * (camera.aspect || 2)), 0.5 * (size.z + 0.5 * size.y) / half) + 0.35 * size.y;
-            camera.position.copy(middle).add(new THREE.Vector3(0.42, -0.79, 0.44).multiplyScalar(1.05 * far));
+            // from the front, the right and above, as the pictures are; so far off that the room's corners are seen
+            var back = new THREE.Vector3(0.42, -0.79, 0.44), right = new THREE.Vector3(0, 0, 1).cross(back).normalize();
+            var up = back.clone().cross(right), half = Math.tan(0.5 * camera.fov * Math.PI / 180), far = 0, k;
+            for (k = 0; k < 8; k++) {
+                var at = new THREE.Vector3(k & 1 ? size.x : -size.x, k & 2 ? size.y : -size.y, k & 4 ? size.z : -size.z).multiplyScalar(0.5);
+                far = Math.max(far, at.dot(back) + Math.max(Math.abs(at.dot(up)) / half, Math.abs(at.dot(right)) / (half * camera.aspect)));
+            }
+            camera.position.copy(middle).addScaledVector(back, 1.03 * far);
         } else
             camera.position.set(middle.x, middle.y, 5);
         camera.updateProjectionMatrix();
@@ -292,7 +299,7 @@
     });
 
     var parts = element('div', controls);
-    function tick_box(text, on, change) {
+    function tickBox(text, on, change) {
         var label = element('label', parts), box = element('input', label);
         box.type = 'checkbox';
         box.checked = on;
@@ -304,10 +311,10 @@
     }
     ['water', 'bed', 'grains', 'bodies', 'walls'].forEach(function (name) {
         if (data.frames.some(function (frame) { return frame[name]; }))
-            tick_box(name, true, function (on) { hidden[name] = !on; });
+            tickBox(name, true, function (on) { hidden[name] = !on; });
     });
     if (space && data.frames.some(function (frame) { return frame.water; }))
-        tick_box('see through the water', false, function (on) { glass = on; });
+        tickBox('see through the water', false, function (on) { glass = on; });
     element('button', parts, 'whole view').addEventListener('click', fit);
     if (data.label && data.frames.some(function (frame) { return ['water', 'bed'].some(function (name) { return frame[name] && frame[name].c !== undefined; }); })) {
         var scale = element('span', parts);
