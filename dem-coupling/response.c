@@ -111,14 +111,14 @@ static void response_step(void *self, long step, int n, int *tag, double **x, do
     response.call++;
 }
 
-void response_open(void *lmp) {
+int response_open(void *lmp) {
     void *fix = lg_find_fix_id(((void **)lmp)[LIGGGHTS_MODIFY], "imp");
-    if (!fix)
-        abort();
-    lg_set_callback(fix, response_step, NULL);
+    if (fix)
+        lg_set_callback(fix, response_step, NULL);
+    return fix != NULL;
 }
 
-void response_begin(void *lmp, dem_shared *shared) {
+int response_begin(void *lmp, dem_shared *shared) {
     dem_body *body = DEM_SECTION(shared, dem_body, body);
     const size_t n = (size_t)shared->n_body;
     response.lmp = lmp;
@@ -129,12 +129,13 @@ void response_begin(void *lmp, dem_shared *shared) {
     response.centre_row = realloc(response.centre_row, (n + 1) * sizeof *response.centre_row);
     response.first = realloc(response.first, (n + 1) * sizeof *response.first);
     if (!response.sum || !response.centre || !response.centre_row || !response.first)
-        abort();
+        return 0;
     for (size_t b = 0; b < n; b++) {
         response.centre_row[b] = response.centre + 3 * b;
         memset(body[b].contact, 0, sizeof body[b].contact);
         memset(body[b].answer, 0, sizeof body[b].answer);
     }
+    return 1;
 }
 
 void response_end(void) {

@@ -8,10 +8,12 @@
 
 #include "protocol.h"
 
-/** Once LIGGGHTS has its fix `imp`, which stands after all contacts, before the water's forces and the bodies' sums. */
-void response_open(void *lmp);
-/** A run of shared->n_step substeps is about to be set up: what the sections `body` and `response` say holds for it. */
-void response_begin(void *lmp, dem_shared *shared);
+/** Once LIGGGHTS has its fix `imp`, which stands after all contacts, before the water's forces and the bodies' sums.
+ * @return 0: it has none */
+int response_open(void *lmp);
+/** A run of shared->n_step substeps is about to be set up: what the sections `body` and `response` say holds for it.
+ * @return 0: out of memory */
+int response_begin(void *lmp, dem_shared *shared);
 /** Its means into the bodies: contact, answer. */
 void response_end(void);
 

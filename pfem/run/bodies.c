@@ -416,7 +416,6 @@ silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_er
     silt_step again = *step;
     again.body_velocity = run->body_velocity;
     again.body_shift = run->body_shift;
-    run->fluid.last_try = true;
     SILT_TRY(silt_fluid_again(&run->fluid, &again, err));
     double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force);
     sum_bodies(run, run->fluid.reaction, -1, force);
