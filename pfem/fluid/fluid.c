@@ -730,5 +730,7 @@ silt_status silt_fluid_again(silt_fluid *f, const silt_step *s, silt_error *err)
     const silt_status status = s->mesh->n_cell ? fluid_iterate(f, s, f->pressure_new, true, err) : SILT_OK;
     f->iterations += before;
     silt_stiff_end(f->stiff);
+    if (s->drag && s->drag->update && status == SILT_OK)
+        s->drag->update(s->drag->self, f->w, f->pressure_new, s->dt);
     return fluid_accept(f, s, status);
 }

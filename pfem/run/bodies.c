@@ -409,6 +409,60 @@ silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_erro
     return status;
 }
 
+// ---------------------------------------------------------------- the answer
+
+/** What grains have received is what the water gives them, whatever comes of its step: forces of the first solve. */
+typedef struct held_drag {
+    silt_drag drag;
+    const silt_fluid *fluid;
+    const silt_mesh *mesh;
+    const silt_drag *first;        // borrowed
+    double *push, *given, *w, *lost; // owned; given, w and lost: push, velocity and the pressure's force on grains at the nodes then
+} held_drag;
+
+// what of the pressure's force on the nodes acts on grains
+static void pressure_on_grains(const silt_fluid *fluid, const silt_mesh *mesh, const double *p, double *out) {
+    silt_fluid clear = *fluid;
+    clear.share = NULL;
+    const int n = fluid->dim * fluid->n_node;
+    memset(out, 0, (size_t)n * sizeof *out);
+    silt_assemble_pressure(&clear, mesh, p, out);
+    for (int k = 0; k < n; k++)
+        out[k] = -out[k];
+    silt_assemble_pressure(fluid, mesh, p, out);
+}
+
+static void held_update(void *self, const double *velocity, const double *pressure, double dt) {
+    held_drag *h = self;
+    (void)dt;
+    const int D = h->fluid->dim, n = D * h->fluid->n_node;
+    pressure_on_grains(h->fluid, h->mesh, pressure, h->push);
+    for (int k = 0; k < n; k++)
+        h->push[k] = h->given[k] - h->first->coefficient[k / D] * (h->w[k] - velocity[k]) + h->lost[k] - h->push[k];
+}
+
+static void held_begin(held_drag *h, const silt_run *run, const silt_drag *drag) {
+    const size_t n = (size_t)run->fluid.n_node, numbers = n * (size_t)run->fluid.dim;
+    *h = (held_drag){.drag = *drag, .fluid = &run->fluid, .mesh = &run->mesh, .first = drag};
+    h->push = silt_alloc(numbers + 1, sizeof(double));
+    h->given = silt_alloc(numbers + 1, sizeof(double));
+    h->w = silt_alloc(numbers + 1, sizeof(double));
+    h->lost = silt_alloc(numbers + 1, sizeof(double));
+    memcpy(h->given, drag->push, numbers * sizeof(double));
+    memcpy(h->w, run->fluid.w, numbers * sizeof(double));
+    pressure_on_grains(&run->fluid, &run->mesh, run->fluid.pressure_new, h->lost);
+    h->drag.push = h->push;
+    h->drag.update = held_update;
+    h->drag.self = h;
+}
+
+static void held_end(held_drag *h) {
+    free(h->push);
+    free(h->given);
+    free(h->w);
+    free(h->lost);
+}
+
 silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_error *err) {
     silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
     memcpy(run->body_after, bodies->body, (size_t)run->n_body_before * sizeof *bodies->body);
@@ -416,7 +470,14 @@ silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_er
     silt_step again = *step;
     again.body_velocity = run->body_velocity;
     again.body_shift = run->body_shift;
-    SILT_TRY(silt_fluid_again(&run->fluid, &again, err));
+    held_drag held = {0};
+    if (step->drag) {
+        held_begin(&held, run, step->drag);
+        again.drag = &held.drag;
+    }
+    const silt_status status = silt_fluid_again(&run->fluid, &again, err);
+    held_end(&held);
+    SILT_TRY(status);
     double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force);
     sum_bodies(run, run->fluid.reaction, -1, force);
     run->body_error = 0;

@@ -131,6 +131,15 @@ static silt_step water_see(silt_run *run) {
     return step;
 }
 
+static silt_status water_gave_up(const silt_run *run, int tries, silt_error *err) {
+    char why[sizeof err->text];
+    snprintf(why, sizeof why, "%s", err ? err->text : "");
+    if (err)
+        *err = (silt_error){0};
+    return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s gave up after %d tries, the last with dt = %.3g s: %s",
+                     (long long)run->step + 1, run->time, tries, run->dt, why);
+}
+
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
     const silt_scene *scene = run->scene;
     water_keep(run);
@@ -162,14 +171,8 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         }
         water_restore(run);
         const bool least = run->coupling && *n <= 1;
-        if (attempt >= scene->time.retries || least) {
-            char why[sizeof err->text];
-            snprintf(why, sizeof why, "%s", err ? err->text : "");
-            if (err)
-                *err = (silt_error){0};
-            return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s gave up after %d tries, the last with dt = %.3g s: %s",
-                             (long long)run->step + 1, run->time, attempt + 1, run->dt, why);
-        }
+        if (attempt >= scene->time.retries || least)
+            return water_gave_up(run, attempt + 1, err);
         if (err)
             *err = (silt_error){0};
         run->summary.retries++;
@@ -309,7 +312,8 @@ static silt_status run_step(silt_run *run, silt_error *err) {
                 silt_run_place(run);
             status = silt_run_grains(run, (int)n, attempt > 0, err);
         });
-        if (status == SILT_OK && scene->fluid.on && silt_run_bodies_free(run)) {
+        const bool moved = status == SILT_OK;
+        if (moved && scene->fluid.on && silt_run_bodies_free(run)) {
             const silt_step step = water_see(run);
             silt_clock_to(CLOCK_assemble);
             status = silt_run_bodies_answer(run, &step, err);
@@ -318,7 +322,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         if (status == SILT_OK)
             break;
         if (!grains_again(run, &n, attempt, err))
-            return silt_run_grains_failed(run, status, err);
+            return moved ? water_gave_up(run, attempt + 1, err) : silt_run_grains_failed(run, status, err);
     }
     if (scene->fluid.on && silt_run_bodies_free(run) && silt_seep_on(scene))
         silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
