@@ -206,6 +206,8 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
         out[k] += f->level_force[k];
     for (int k = 0; f->bed_force && k < D * f->n_node; k++)
         out[k] += f->bed_force[k];
+    for (int k = 0; s->gap_force && k < D * f->n_node; k++)
+        out[k] += s->gap_force[k];
     if (s->scene->fluid.surface_tension > 0)
         silt_tension_force(s->mesh, f->x_mid, s->scene->fluid.surface_tension, out);
     if (s->pockets)
@@ -433,6 +435,8 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
 
     for (int k = 0; f->bed_force && k < D * f->n_node; k++)
         out[k] += s->mesh->wet[k / D] ? f->bed_force[k] : 0;
+    for (int k = 0; s->gap_force && k < D * f->n_node; k++)
+        out[k] += s->mesh->wet[k / D] ? s->gap_force[k] : 0;
     // the law of the wall brakes what is free
     for (int k = 0; k < f->law.n_point; k++) {
         const int i = f->law.point[k].node;

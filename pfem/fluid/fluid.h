@@ -30,6 +30,7 @@ typedef struct silt_step {
     double time, dt;             // s, start and length
     // dim per node, m/s, of nodes on bodies: velocity of the momentum, and what carries their places beside it; NULL: the nodes' own, none
     const double *body_velocity, *body_shift;
+    const double *gap_force; // dim per node, N, of the water in gaps too narrow for cells on what is at their mouths; NULL: none
 } silt_step;
 
 /** working space and results of a step; arrays grow only */
@@ -242,8 +243,9 @@ void silt_pressure_forget(silt_pressure *pressure);
 // impedance.c ---------------------------------------------------------------------------------------------
 /** What the step that was just solved answers to a change of its velocity on held nodes: motion, dim per node, nought where nothing
  * changes. Linear: the matrix of the step's end, whose momentum and continuity are solved for it. reaction, dim per node: change of
- * the forces that hold the held nodes, N per m/s. Takes fluid->reaction as working space. */
-silt_status silt_fluid_mode(silt_fluid *fluid, const silt_step *step, const double *motion, double *reaction, silt_error *err);
+ * the forces that hold the held nodes, N per m/s; pressure, 1 per node: change of it. Takes fluid->reaction as working space. */
+silt_status silt_fluid_mode(silt_fluid *fluid, const silt_step *step, const double *motion, double *reaction, double *pressure,
+                            silt_error *err);
 
 // fluid.c
 /** v += P G q/inertia */

@@ -53,7 +53,8 @@ static void mode_excess(silt_fluid *f, const silt_step *s, const double *w, doub
     silt_assemble_mass_excess(f, s->mesh, s->scene->fluid.density, acceleration, excess);
 }
 
-silt_status silt_fluid_mode(silt_fluid *f, const silt_step *s, const double *motion, double *reaction, silt_error *err) {
+silt_status silt_fluid_mode(silt_fluid *f, const silt_step *s, const double *motion, double *reaction, double *pressure,
+                            silt_error *err) {
     const int D = f->dim;
     const size_t n = (size_t)f->n_node, bytes = (size_t)D * n * sizeof(double);
     double *own = silt_alloc((2 * (size_t)D + 1) * n + 1, sizeof *own); // sum of the increments, velocity, excess
@@ -90,6 +91,7 @@ silt_status silt_fluid_mode(silt_fluid *f, const silt_step *s, const double *mot
             p[i] += f->increment[i];
         mode_excess(f, s, w, f->star, excess);
     }
+    memcpy(pressure, p, n * sizeof *pressure);
     if (status == SILT_OK) {
         memset(f->scratch, 0, bytes);
         silt_assemble_viscous(f, s->mesh, w, 1, f->scratch);

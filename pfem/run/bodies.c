@@ -118,6 +118,9 @@ void silt_run_bodies_coast(silt_run *run) {
         run->body_after[b] = coasting(&bodies->body[b], run->dt);
     }
     node_motion(run, run->body_before, run->body_after, 1);
+    silt_uplift_find(&run->uplift, run);
+    SILT_RESERVE(run->gap_force, run->gap_force_capacity, silt_nodes_dim(&run->nodes) * (run->nodes.count + 1));
+    run->gaps = silt_uplift_mouths(run->uplift, run, run->gap_force);
 }
 
 // force and torque of the nodes' `push` on every body, about its place half way through the step; ROW per body. @param sign  of it
@@ -233,15 +236,16 @@ static silt_status impedance_solve(silt_run *run, const silt_step *step, silt_im
     const int D = silt_nodes_dim(&run->nodes);
     const size_t n = (size_t)(D * run->nodes.count) + 1;
     double *motion = silt_alloc(n, sizeof *motion), *reaction = silt_alloc(n, sizeof *reaction);
-    double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force);
+    double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force), *p = silt_alloc(n, sizeof *p);
     const double per_acceleration = run->fluid.theta * run->dt;
     silt_status status = SILT_OK;
     for (int l = 0; l < z->n_live && status == SILT_OK; l++) {
         const int row = z->live[l], k = row / ROW;
         if (!mode_motion(run, z->body[k], row % ROW, motion))
             continue;
-        status = silt_fluid_mode(&run->fluid, step, motion, reaction, err);
+        status = silt_fluid_mode(&run->fluid, step, motion, reaction, p, err);
         sum_bodies(run, reaction, per_acceleration, force);
+        silt_uplift_force(run->uplift, run, p, -per_acceleration, force);
         for (int o = 0; o < z->n; o++)
             for (int r = 0; r < ROW; r++)
                 z->water[(ROW * o + r) * z->size + row] = force[ROW * z->body[o] + r];
@@ -254,6 +258,7 @@ static silt_status impedance_solve(silt_run *run, const silt_step *step, silt_im
     free(motion);
     free(reaction);
     free(force);
+    free(p);
     return status;
 }
 
@@ -389,6 +394,7 @@ silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_erro
     SILT_RESERVE(run->body_carry, run->body_carry_capacity, run->n_body_before + 1);
     double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force);
     sum_bodies(run, run->fluid.reaction, -1, force);
+    silt_uplift_force(run->uplift, run, run->nodes.p, 1, force);
     if (!silt_run_bodies_free(run)) {
         silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
         for (int b = 0; b < bodies->count; b++) {
@@ -480,6 +486,7 @@ silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_er
     SILT_TRY(status);
     double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force);
     sum_bodies(run, run->fluid.reaction, -1, force);
+    silt_uplift_force(run->uplift, run, run->nodes.p, 1, force);
     run->body_error = 0;
     for (int b = 0; b < run->n_body_before; b++) {
         struct silt_body *body = &bodies->body[b];

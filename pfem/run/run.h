@@ -21,6 +21,8 @@ typedef struct silt_rest {
     double time; // s
 } silt_rest;
 
+typedef struct silt_uplift silt_uplift; // uplift.c
+
 struct silt_run {
     const silt_scene *scene;
     silt_scene *scene_own; // owned, the same where a run was taken up again, else NULL
@@ -86,8 +88,11 @@ struct silt_run {
     struct silt_body *body_before; // owned, poses at the start of the step
     int body_after_capacity, body_velocity_capacity, body_shift_capacity, body_carry_capacity;
     struct silt_body *body_after;  // owned, poses at its end, as far as they are known
-    double *body_velocity, *body_shift; // owned, dim per node, see silt_step
+    double *body_velocity, *body_shift, *gap_force; // owned, dim per node, see silt_step
+    int gap_force_capacity;
+    bool gaps;                     // there are any
     double (*body_carry)[6];       // owned, N s and N m s per m: what the water gave bodies and they have not received yet
+    silt_uplift *uplift;           // owned
     double body_error;             // what weight, contacts and water leave open of bodies' momentum, relative to them
     double *x_old;   // owned, 2 per node, positions at the start of the step
     double *v_old, *debt_old; // owned, 2 and 1 per node, velocities and debts at the start of the step
@@ -143,6 +148,15 @@ silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_erro
 /** After the discrete elements have moved: the water's step again, with that motion of the bodies; what its force on them differs
  * from what they received is carried to the next step. */
 silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_error *err);
+
+// uplift.c --------------------------------------------------------------------------------------------
+/** Where bodies have nothing of the water's mesh on them, but no air either; of the present mesh. Makes *uplift at first. */
+void silt_uplift_find(silt_uplift **uplift, const silt_run *run);
+/** out, 6 numbers a body: += factor times force and torque of the pressure there, from p of the nodes around */
+void silt_uplift_force(const silt_uplift *uplift, const silt_run *run, const double *p, double factor, double *out);
+/** out, 2 per node: the pressure there on the water's nodes at its mouths. @return false: there are none */
+bool silt_uplift_mouths(const silt_uplift *uplift, const silt_run *run, double *out);
+void silt_uplift_free(silt_uplift **uplift);
 
 // ledger.c --------------------------------------------------------------------------------------------
 /** volume, mass, momentum, energy and sediment of the state, and their errors so far */
