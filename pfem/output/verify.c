@@ -26,7 +26,7 @@ static void history_clear(verify_history *history) {
 }
 
 // index of a name in the header line, -1: absent
-static int history_find(const char *header, const char *name) {
+int silt_history_find(const char *header, const char *name) {
     size_t length = strlen(name);
     for (int i = 0;; i++) {
         size_t field = strcspn(header, ",\r\n");
@@ -38,7 +38,7 @@ static int history_find(const char *header, const char *name) {
     }
 }
 
-static double history_number(const char *row, int column) {
+double silt_history_number(const char *row, int column) {
     for (; row && column > 0; column--)
         row = (row = strchr(row, ',')) ? row + 1 : NULL;
     char *end;
@@ -56,7 +56,7 @@ static silt_status history_read(verify_history *history, const silt_scene *scene
         status = silt_fail(err, SILT_FAILED, "%s: cannot be read (%s)", path, strerror(errno));
         goto done;
     }
-    int time = getline(&line, &capacity, from) > 0 ? history_find(line, "time") : -1;
+    int time = getline(&line, &capacity, from) > 0 ? silt_history_find(line, "time") : -1;
     if (time < 0) {
         status = silt_fail(err, SILT_FAILED, "%s: its first line has no column time", path);
         goto done;
@@ -64,15 +64,15 @@ static silt_status history_read(verify_history *history, const silt_scene *scene
     int n = scene->n_check;
     history->column = silt_alloc((size_t)n + 1, sizeof *history->column);
     for (int i = 0; i < n; i++)
-        history->column[i] = scene->check[i].column ? history_find(line, scene->check[i].column) : -1;
+        history->column[i] = scene->check[i].column ? silt_history_find(line, scene->check[i].column) : -1;
     // a last line without its end is what a killed run left, and does not count
     while ((length = getline(&line, &capacity, from)) > 0 && line[length - 1] == '\n') {
         int row = history->n_row++;
         SILT_RESERVE(history->time, history->time_capacity, row + 1);
         SILT_RESERVE(history->value, history->value_capacity, (row + 1) * n);
-        history->time[row] = history_number(line, time);
+        history->time[row] = silt_history_number(line, time);
         for (int i = 0; i < n; i++)
-            history->value[row * n + i] = history->column[i] < 0 ? NAN : history_number(line, history->column[i]);
+            history->value[row * n + i] = history->column[i] < 0 ? NAN : silt_history_number(line, history->column[i]);
     }
 done:
     if (from)
