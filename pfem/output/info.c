@@ -99,15 +99,18 @@ void silt_info_scene(const silt_scene *scene, FILE *to) {
 
 // ---------------------------------------------------------------- an output folder
 
-struct fy_document *silt_summary_read(const char *out) {
+struct fy_document *silt_summary_open(const char *out) {
     char *path = silt_text("%s/summary.json", out);
     struct stat file;
     struct fy_document *summary = NULL;
-    // the parser complains on stderr where there is none
     if (stat(path, &file) == 0)
         summary = fy_document_build_from_file(&(struct fy_parse_cfg){.flags = FYPCF_QUIET | FYPCF_JSON_AUTO}, path);
     free(path);
     return summary;
+}
+
+void silt_summary_close(struct fy_document *summary) {
+    fy_document_destroy(summary);
 }
 
 const char *silt_summary_text(struct fy_document *summary, const char *key) {
@@ -181,7 +184,7 @@ static silt_status info_out(const char *out, FILE *to, silt_error *err) {
         status = silt_fail(err, SILT_INPUT, "%s: no output of a run stands there, history.csv is absent", out);
         goto done;
     }
-    summary = silt_summary_read(out);
+    summary = silt_summary_open(out);
     if (summary) {
         info_summary(summary, to);
     } else {
@@ -200,7 +203,7 @@ static silt_status info_out(const char *out, FILE *to, silt_error *err) {
         free(checkpoint);
     }
 done:
-    fy_document_destroy(summary);
+    silt_summary_close(summary);
     free(history);
     return status;
 }

@@ -125,8 +125,10 @@ typedef struct silt_summary {
 } silt_summary;
 silt_status silt_summary_write(const char *out, const silt_view *view, const silt_summary *summary, silt_error *err);
 struct fy_document; // of libfyaml
-/** OUT/summary.json, NULL: none; to be freed with fy_document_destroy. Values at a path like "/checks/0/error": "" and 0 where there is none */
-struct fy_document *silt_summary_read(const char *out);
+/** OUT/summary.json; NULL: absent or broken */
+struct fy_document *silt_summary_open(const char *out);
+void silt_summary_close(struct fy_document *summary);
+/** a scalar of it by its path, "/phases/mesh/seconds"; "" and 0 where there is none */
 const char *silt_summary_text(struct fy_document *summary, const char *key);
 double silt_summary_number(struct fy_document *summary, const char *key);
 /** a text in quotes or null; a name with its number (NaN and infinity: null) and what follows it */

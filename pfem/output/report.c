@@ -3,7 +3,7 @@
 #include "report.h"
 
 #include <errno.h>
-#include <libfyaml.h>
+#include <time.h>
 #include <unistd.h>
 
 void silt_report_base64(FILE *to, const void *data, size_t n) {
@@ -35,7 +35,7 @@ static void report_row(FILE *to, const char *name, const char *format, ...) {
 
 // what ran, how it ended and on what, from summary.json; a run that goes on has none
 static void report_run(const silt_report_page *r, const silt_table *table, const silt_draw_book *book) {
-    struct fy_document *summary = silt_summary_read(r->out);
+    struct fy_document *summary = silt_summary_open(r->out);
     const double *time = silt_table_column(table, "time"), *n_node = silt_table_column(table, "n_node");
     const int last = table->n_row - 1;
     const char *message = silt_summary_text(summary, "/message"), *processor = silt_summary_text(summary, "/machine/processor");
@@ -72,7 +72,7 @@ static void report_run(const silt_report_page *r, const silt_table *table, const
     if (summary)
         report_row(r->to, "program", "silt %s; scene %s", silt_summary_text(summary, "/version"), silt_summary_text(summary, "/scene_hash"));
     fputs("</table>\n", r->to);
-    fy_document_destroy(summary);
+    silt_summary_close(summary);
 }
 
 // ---------------------------------------------------------------- pictures and scene

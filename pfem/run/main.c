@@ -38,7 +38,7 @@ enum { OPTION_UNTIL = 'u', OPTION_THREADS = 't', OPTION_FORCE = 'f', OPTION_FRAM
 #define LONG_ONLY(key) ((key) + 256)
 
 static const struct argp_option main_options[] = {
-    {"output", 'o', "OUT", 0, "output folder; default: the scene's folder name plus .out in the current folder (bench: JSON file; default: none; report: the page, default: OUT/report.html; study: its results, default: its name plus .study)", 0},
+    {"output", 'o', "OUT", 0, "output folder; default: the scene's folder name plus .out in the current folder (bench: JSON file, default: none; report: the page, default: OUT/report.html; study: its results, default: its name plus .study)", 0},
     {NULL, 'D', "KEY=VALUE", 0, "set a key of the scene, for example fluid.size=0.01 or bodies.temple.density=700", 0},
     {"until", LONG_ONLY(OPTION_UNTIL), "T", 0, "run to this time in s instead of the scene's time.end", 0},
     {"threads", LONG_ONLY(OPTION_THREADS), "N", 0, "threads; default: all, or OMP_NUM_THREADS; the results are the same bits (bench: one; with more, every other step is done on one)", 0},
