@@ -398,7 +398,7 @@ static int script_moving(void *lmp, const dem_shared *s, int *plane, FILE *names
     const dem_motion *motion = DEM_SECTION(s, const dem_motion, motion);
     char path[128];
     script_wall_path(path);
-    script_motion(lmp, s);
+    script_motion(lmp, s, 1);
     for (int m = 0; m < s->n_motion; m++) {
         if (!script_surface(s, m, plane, path))
             continue;
@@ -414,13 +414,13 @@ static int script_moving(void *lmp, const dem_shared *s, int *plane, FILE *names
 }
 
 // LIGGGHTS knows variables by their place in its list, and puts one that is given anew at the end: all of them are, in the same order
-void script_motion(void *lmp, const dem_shared *s) {
+void script_motion(void *lmp, const dem_shared *s, double share) {
     const dem_motion *motion = DEM_SECTION(s, const dem_motion, motion);
     for (int m = 0; m < s->n_motion; m++) {
-        script_say(lmp, "variable x%d equal %.17g", m, motion[m].velocity[0]);
-        script_say(lmp, "variable y%d equal %.17g", m, motion[m].velocity[1]);
-        script_say(lmp, "variable z%d equal %.17g", m, motion[m].velocity[2]);
-        script_say(lmp, "variable w%d equal %.17g", m, motion[m].spin);
+        script_say(lmp, "variable x%d equal %.17g", m, share * motion[m].velocity[0]);
+        script_say(lmp, "variable y%d equal %.17g", m, share * motion[m].velocity[1]);
+        script_say(lmp, "variable z%d equal %.17g", m, share * motion[m].velocity[2]);
+        script_say(lmp, "variable w%d equal %.17g", m, share * motion[m].spin);
     }
 }
 

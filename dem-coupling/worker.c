@@ -497,13 +497,16 @@ static void worker_run(void) {
         script_add(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
     if (s->n_remove || s->n_add || worker.n_body || !s->keep)
         worker.settled = 0;
-    if (s->n_step > 0) {
+    const bool setting = !worker.settled && (s->n_step > 0 || s->n_remove || s->n_add);
+    if (s->n_step > 0)
         worker_load();
-        script_motion(worker.lmp, s);
-    }
+    if (setting || s->n_step > 0)
+        script_motion(worker.lmp, s, setting ? 0 : 1);
     // the multisphere bodies' sums of forces cannot be reached: they are set up for every run (ten thousand grains: 5 ms)
-    if (!worker.settled && (s->n_step > 0 || s->n_remove || s->n_add))
+    if (setting)
         worker_set_up();
+    if (setting && s->n_step > 0)
+        script_motion(worker.lmp, s, 1);
     if (s->n_step > 0)
         worker_advance(s->n_step);
     worker_answer();
@@ -568,7 +571,13 @@ static void worker_mpi(void) {
 int main(int argc, char **argv) {
     struct stat file;
 
-    if (argc != 3 || strcmp(argv[1], "serve") != 0 || fstat(DEM_FD_SOCKET, &file) != 0 || !S_ISSOCK(file.st_mode)) {
+    char word[48];
+    dem_serve_word(word);
+    if (argc == 3 && strncmp(argv[1], "serve", 5) == 0 && strcmp(argv[1], word) != 0) {
+        fprintf(stderr, "this silt-dem is of another version than the silt that started it (asked for: %s, here: %s)\n", argv[1], word);
+        return 2;
+    }
+    if (argc != 3 || strcmp(argv[1], word) != 0 || fstat(DEM_FD_SOCKET, &file) != 0 || !S_ISSOCK(file.st_mode)) {
         fprintf(stderr, "silt-dem is the worker that silt starts for grains and bodies; it cannot be used by hand\n");
         return 2;
     }
@@ -582,11 +591,11 @@ int main(int argc, char **argv) {
     worker_mpi();
 
     for (double told = 0;;) {
-        char word = 0;
-        ssize_t got = recv(DEM_FD_SOCKET, &word, 1, 0);
+        char byte = 0;
+        ssize_t got = recv(DEM_FD_SOCKET, &byte, 1, 0);
         if (got < 0 && errno == EINTR)
             continue;
-        if (got != 1 || word == DEM_CLOSE)
+        if (got != 1 || byte == DEM_CLOSE)
             break;
         worker_map();
         worker.shared->text[0] = 0;
@@ -595,19 +604,19 @@ int main(int argc, char **argv) {
             if (ftruncate(fileno(worker.screen), 0) != 0)
                 worker_fail("memory file: %s", strerror(errno));
         }
-        if (word == DEM_OPEN)
+        if (byte == DEM_OPEN)
             worker_open();
-        else if (word == DEM_BODIES)
+        else if (byte == DEM_BODIES)
             worker_bodies();
-        else if (word == DEM_RUN)
+        else if (byte == DEM_RUN)
             worker_run();
-        else if (word == DEM_SAVE)
+        else if (byte == DEM_SAVE)
             worker_save();
         const double cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID);
         worker.shared->cpu_all = cpu - told;
         told = cpu;
-        word = DEM_DONE;
-        if (send(DEM_FD_SOCKET, &word, 1, MSG_NOSIGNAL) != 1)
+        byte = DEM_DONE;
+        if (send(DEM_FD_SOCKET, &byte, 1, MSG_NOSIGNAL) != 1)
             break;
     }
     if (worker.lmp)

@@ -60,7 +60,7 @@ static void info_model(const silt_scene *scene, FILE *to) {
         fprintf(to, "  periodic   in x from %g to %g m\n", scene->period[0], scene->period[1]);
 }
 
-static void info_scene(const silt_scene *scene, FILE *to) {
+void silt_info_scene(const silt_scene *scene, FILE *to) {
     const silt_fluid_def *fluid = &scene->fluid;
     const silt_bed_def *bed = &scene->bed;
     fprintf(to, "%s\n", scene->title && *scene->title ? scene->title : "untitled");
@@ -99,19 +99,22 @@ static void info_scene(const silt_scene *scene, FILE *to) {
 
 // ---------------------------------------------------------------- an output folder
 
-struct fy_document *silt_summary_read(const char *out) {
+struct fy_document *silt_summary_open(const char *out) {
     char *path = silt_text("%s/summary.json", out);
     struct stat file;
     struct fy_document *summary = NULL;
-    // the parser complains on stderr where there is none
     if (stat(path, &file) == 0)
         summary = fy_document_build_from_file(&(struct fy_parse_cfg){.flags = FYPCF_QUIET | FYPCF_JSON_AUTO}, path);
     free(path);
     return summary;
 }
 
+void silt_summary_close(struct fy_document *summary) {
+    fy_document_destroy(summary);
+}
+
 const char *silt_summary_text(struct fy_document *summary, const char *key) {
-    struct fy_node *node = fy_node_by_path(fy_document_root(summary), key, FY_NT, FYNWF_DONT_FOLLOW);
+    struct fy_node *node = summary ? fy_node_by_path(fy_document_root(summary), key, FY_NT, FYNWF_DONT_FOLLOW) : NULL;
     const char *text = node && fy_node_is_scalar(node) ? fy_node_get_scalar0(node) : NULL;
     return text ? text : "";
 }
@@ -181,7 +184,7 @@ static silt_status info_out(const char *out, FILE *to, silt_error *err) {
         status = silt_fail(err, SILT_INPUT, "%s: no output of a run stands there, history.csv is absent", out);
         goto done;
     }
-    summary = silt_summary_read(out);
+    summary = silt_summary_open(out);
     if (summary) {
         info_summary(summary, to);
     } else {
@@ -200,7 +203,7 @@ static silt_status info_out(const char *out, FILE *to, silt_error *err) {
         free(checkpoint);
     }
 done:
-    fy_document_destroy(summary);
+    silt_summary_close(summary);
     free(history);
     return status;
 }
@@ -213,7 +216,7 @@ silt_status silt_info(const char *path, FILE *to, silt_error *err) {
         return info_out(path, to, err);
     silt_scene *scene = NULL;
     SILT_TRY(silt_scene_read(path, 0, NULL, &scene, err));
-    info_scene(scene, to);
+    silt_info_scene(scene, to);
     silt_scene_free(&scene);
     return SILT_OK;
 }

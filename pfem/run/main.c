@@ -19,8 +19,7 @@ typedef struct main_arguments {
     silt_run_def run;
     int steps, warm_up; // of bench
     const char *sizes;
-    int frame; // -1 all, -2 the last
-    const char *field, *slice, *to;
+    silt_draw_def draw;
     silt_study_def study;
 } main_arguments;
 
@@ -34,11 +33,12 @@ typedef struct main_command {
 // ---------------------------------------------------------------- options
 
 enum { OPTION_UNTIL = 'u', OPTION_THREADS = 't', OPTION_FORCE = 'f', OPTION_FRAME = 'n', OPTION_FIELD = 'c', OPTION_SLICE = 'l',
-       OPTION_SIZES = 's', OPTION_STEPS = 'p', OPTION_WARM_UP = 'm', OPTION_PLAN = 'a', OPTION_COLLECT = 'g', OPTION_JOB = 'r' };
+       OPTION_SIZES = 's', OPTION_STEPS = 'p', OPTION_WARM_UP = 'm', OPTION_PLAN = 'a', OPTION_COLLECT = 'g', OPTION_JOB = 'r',
+       OPTION_WITHOUT = 'x', OPTION_FILM = 'i' };
 #define LONG_ONLY(key) ((key) + 256)
 
 static const struct argp_option main_options[] = {
-    {"output", 'o', "OUT", 0, "output folder; default: the scene's folder name plus .out in the current folder (bench: JSON file; default: none; study: its results, default: its name plus .study)", 0},
+    {"output", 'o', "OUT", 0, "output folder; default: the scene's folder name plus .out in the current folder (bench: JSON file, default: none; report: the page, default: OUT/report.html; study: its results, default: its name plus .study)", 0},
     {NULL, 'D', "KEY=VALUE", 0, "set a key of the scene, for example fluid.size=0.01 or bodies.temple.density=700", 0},
     {"until", LONG_ONLY(OPTION_UNTIL), "T", 0, "run to this time in s instead of the scene's time.end", 0},
     {"threads", LONG_ONLY(OPTION_THREADS), "N", 0, "threads; default: all, or OMP_NUM_THREADS; the results are the same bits (bench: one; with more, every other step is done on one)", 0},
@@ -48,6 +48,8 @@ static const struct argp_option main_options[] = {
     {"frame", LONG_ONLY(OPTION_FRAME), "N|all", 0, "the frame to draw; default: the last", 0},
     {"field", LONG_ONLY(OPTION_FIELD), "NAME", 0, "speed (default), pressure, elevation, vorticity, porosity, mesh or bed", 0},
     {"slice", LONG_ONLY(OPTION_SLICE), "PLANE", 0, "a cut through three dimensions, for example y=0.5", 0},
+    {"without", LONG_ONLY(OPTION_WITHOUT), "PARTS", 0, "leave out water, bed, grains, bodies or walls; several with commas between", 0},
+    {"film", LONG_ONLY(OPTION_FILM), "FILE", 0, "all frames as a moving picture: FILE.mp4, .webm, .webp or .gif (made by ffmpeg)", 0},
     {"sizes", LONG_ONLY(OPTION_SIZES), "LIST", 0, "nodes, for example 10k,40k; of a collapse N, for example 20,40", 0},
     {"steps", LONG_ONLY(OPTION_STEPS), "N", 0, "steps that are measured; default: 9", 0},
     {"warm-up", LONG_ONLY(OPTION_WARM_UP), "N", 0, "steps before those; default: 6", 0},
@@ -98,15 +100,16 @@ static error_t main_option(int key, char *text, struct argp_state *state) {
         a->run.worker = text;
         return 0;
     case LONG_ONLY(OPTION_FRAME):
-        a->frame = strcmp(text, "all") == 0 ? -1 : (int)strtol(text, &end, 10);
-        if (a->frame < -1 || (a->frame >= 0 && (end == text || *end)))
+        a->draw.frames = strcmp(text, "all") == 0 ? DRAW_ALL : DRAW_ONE;
+        a->draw.frame = a->draw.frames == DRAW_ONE ? (int)strtol(text, &end, 10) : 0;
+        if (a->draw.frames == DRAW_ONE && (a->draw.frame < 0 || end == text || *end))
             argp_error(state, "--frame %s: a frame's number or all is needed", text);
         return 0;
     case LONG_ONLY(OPTION_FIELD):
-        a->field = text;
+        a->draw.field = text;
         return 0;
     case LONG_ONLY(OPTION_SLICE):
-        a->slice = text;
+        a->draw.slice = text;
         return 0;
     case LONG_ONLY(OPTION_SIZES):
         a->sizes = text;
@@ -117,8 +120,14 @@ static error_t main_option(int key, char *text, struct argp_state *state) {
     case LONG_ONLY(OPTION_WARM_UP):
         a->warm_up = (int)main_number(state, "--warm-up", text, true);
         return 0;
+    case LONG_ONLY(OPTION_WITHOUT):
+        a->draw.without = text;
+        return 0;
+    case LONG_ONLY(OPTION_FILM):
+        a->draw.film = text;
+        return 0;
     case LONG_ONLY('d'):
-        a->to = text;
+        a->draw.to = text;
         return 0;
     case 'j':
         a->study.jobs = (int)main_number(state, "-j", text, true);
@@ -191,9 +200,15 @@ static silt_status main_verify(const main_arguments *a, silt_error *err) {
 
 static silt_status main_draw(const main_arguments *a, silt_error *err) {
     SILT_TRY(main_out(a, err));
-    if (a->to && mkdir(a->to, 0777) != 0 && errno != EEXIST)
-        return silt_fail(err, SILT_FAILED, "%s: cannot be made (%s)", a->to, strerror(errno));
-    return silt_draw(a->path, a->frame, a->field, a->slice, a->to, stdout, err);
+    if (a->draw.to && mkdir(a->draw.to, 0777) != 0 && errno != EEXIST)
+        return silt_fail(err, SILT_FAILED, "%s: cannot be made (%s)", a->draw.to, strerror(errno));
+    return silt_draw(a->path, &a->draw, stdout, err);
+}
+
+static silt_status main_report(const main_arguments *a, silt_error *err) {
+    SILT_TRY(main_out(a, err));
+    const silt_report_def def = {.path = a->run.out, .draw = a->draw};
+    return silt_report(a->path, &def, stdout, err);
 }
 
 static silt_status main_info(const main_arguments *a, silt_error *err) {
@@ -227,7 +242,8 @@ static const main_command main_commands[] = {
     {"resume", "OUT", "Goes on from the newest whole checkpoint in OUT; with --until also a finished run.", "utqw",
      main_resume},
     {"verify", "OUT", "Holds the results in OUT against the checks of the scene, a line per check.", "", main_verify},
-    {"draw", "OUT", "Draws frames of a run as PNG pictures.", "ncdl", main_draw},
+    {"draw", "OUT", "Draws frames of a run as PNG pictures, or all of them as a film.", "ncdlxi", main_draw},
+    {"report", "OUT", "Makes one HTML page of a run: pictures, a view to turn, checks, ledgers, times.", "oclx", main_report},
     {"info", "OUT|SCENE", "Tells what a scene asks for, or what stands in an output folder.", "", main_info},
     {"bench", "[SCENES]", "Measures what steps cost, phase by phase, in scenes of its own or in files (commas between).", "oDtqwspm",
      main_bench},
@@ -310,7 +326,7 @@ static void main_calm(char **argv) {
 
 int main(int argc, char **argv) {
     silt_memory_settle();
-    main_arguments a = {.frame = -2};
+    main_arguments a = {0};
     silt_error err = {0};
     const char *word = argc > 1 ? argv[1] : "";
     if (strcmp(word, "--version") == 0 || strcmp(word, "-V") == 0) {

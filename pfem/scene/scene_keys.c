@@ -50,6 +50,8 @@ static const silt_word lift_words[] = {{"none", LIFT_NONE}, {"saffman", LIFT_SAF
 static const silt_word shape_words[] = {
     {"box", SHAPE_BOX}, {"disc", SHAPE_DISC}, {"polygon", SHAPE_POLYGON}, {"temple", SHAPE_TEMPLE}, {0}};
 static const silt_word motion_words[] = {{"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {0}};
+static const silt_word baseline_words[] = {
+    {"none", BASELINE_NONE}, {"velocity", BASELINE_VELOCITY}, {"place", BASELINE_PLACE}, {0}};
 static const silt_word front_words[] = {{"x", 1}, {"-x", -1}, {0}};
 static const silt_word norm_words[] = {{"l2", NORM_L2}, {"max", NORM_MAX}, {"mean", NORM_MEAN}, {0}};
 static const silt_word scalar_words[] = {{"none", SCALAR_NONE},
@@ -97,6 +99,8 @@ static const silt_key time_rows[] = {
      .doc = "share of a cell that a node may cross in a step"},
     {"checkpoint", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_scene, time.checkpoint),
      .doc = "time between checkpoints; 0: ten outputs"},
+    {"wall", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_scene, time.wall),
+     .doc = "seconds of the wall's clock after which a process stops with a checkpoint and exit code 3, as after SIGTERM; 0: no limit"},
     {"steps", KEY_LONG, .fallback = "0", RANGE(0, 1e15), AT(silt_scene, time.steps), .doc = "most steps; 0: no limit"},
     {"retries", KEY_INTEGER, .fallback = "8", RANGE(0, 30), AT(silt_scene, time.retries),
      .doc = "how often a failed step is halved"},
@@ -351,9 +355,14 @@ static const silt_key wall_rows[] = {
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_wall, velocity),
      .doc = "of the wall's surface along itself, which stays where it is: a lid, a belt"},
     {"motion", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_wall, motion),
-     .doc = "CSV file beside the scene: time in s, then any of x, y, z in m and angle in degrees from the place given "
-            "here, "
-            "columns by name; the angle turns from x to y (3-D: from x to z)"},
+     .doc = "CSV file beside the scene: time in s, then any of x, y, z in m and angle in degrees from the place given here, columns by "
+            "name; the angle turns from x to y (3-D: from x to z). In their place accelerations ax, ay, az in m/s2 and aangle in "
+            "degrees/s2, as of an earthquake: linear between rows, integrated exactly from rest at the first row, none after the last"},
+    {"motion_scale", KEY_NUMBER, .fallback = "1", AT(silt_wall, motion_scale),
+     .doc = "factor on all columns of `motion` but time: 9.81 where a record is in g"},
+    {"baseline", KEY_WORD, .fallback = "none", .words = baseline_words, AT(silt_wall, baseline),
+     .doc = "what is taken off the accelerations of `motion`: nothing, a constant so that the last row is at rest, or a straight line over "
+            "time so that it is at rest where it began"},
     {"pivot", KEY_POINT, .unit = "m", .fallback = "[0, 0]", AT(silt_wall, pivot), .doc = "what the angle turns about"},
     {0}};
 TABLE(wall, "a wall", silt_wall, offsetof(silt_wall, form));

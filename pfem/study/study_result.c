@@ -259,7 +259,7 @@ static void result_checks(struct fy_document *summary, study_row *row) {
 }
 
 void study_result(const study *s, const char *out, const char *log, const study_end *end, study_row *row) {
-    struct fy_document *summary = end->code >= 0 ? silt_summary_read(out) : NULL;
+    struct fy_document *summary = end->code >= 0 ? silt_summary_open(out) : NULL;
     study_status status = RUN_OK;
     char reason[400] = "", why[200];
     study_row numbers = {0};
@@ -304,5 +304,5 @@ void study_result(const study *s, const char *out, const char *log, const study_
         result_checks(summary, row);
     }
     study_row_clear(&numbers);
-    fy_document_destroy(summary);
+    silt_summary_close(summary);
 }
