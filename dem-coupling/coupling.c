@@ -67,6 +67,15 @@ static silt_status coupling_shapes(silt_coupling *c, silt_error *err) {
     return SILT_OK;
 }
 
+// the ends of the walls in y: what grains that come in at the other side go between
+static void coupling_sides(silt_coupling *c) {
+    for (int i = 0; i < c->walls->count; i++)
+        for (int k = 0; k < 3; k++) {
+            c->dem_def.lo[1] = silt_min(i + k > 0 ? c->dem_def.lo[1] : HUGE_VAL, c->walls->corner[i][k][1]);
+            c->dem_def.hi[1] = silt_max(i + k > 0 ? c->dem_def.hi[1] : -HUGE_VAL, c->walls->corner[i][k][1]);
+        }
+}
+
 // widths, radii, time step and everything else that the worker is told once
 static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     const silt_scene *scene = c->scene;
@@ -151,6 +160,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .way_lo = {def->way_lo[0], def->way_lo[1], def->way_lo[2]},
         .way_hi = {def->way_hi[0], def->way_hi[1], def->way_hi[2]},
         .periodic = periodic,
+        .across = grains->across,
         .period = period_share * 2.0 * largest,
         .gravity = {scene->gravity[0], scene->gravity[1], scene->gravity[2]},
         .youngs_modulus = contact->youngs_modulus,
@@ -172,6 +182,8 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .min_radius = smallest,
         .no_contacts = !scene->bed.on || !scene->bed.deposition,
     };
+    if (grains->across)
+        coupling_sides(c);
 }
 
 // ---------------------------------------------------------------- grains
@@ -355,13 +367,18 @@ static void coupling_bed_changed(silt_coupling *c, const silt_bed *bed) {
 static int coupling_locate(silt_coupling *c, coupling_grain *g, const silt_nodes *nodes, const silt_mesh *mesh,
                            bool *located, double *weight) {
     int cell = -1;
+    double x[3] = {g->x[0], g->x[1], g->x[2]};
+    if (c->dem_def.across) {
+        const double low = c->dem_def.lo[1], wide = c->dem_def.hi[1] - low;
+        x[1] -= wide * floor((x[1] - low) / wide);
+    }
     if (g->near >= 0 && g->near < mesh->n_node && mesh->wet[g->near])
-        cell = silt_locate_from(mesh, nodes->x, g->x, mesh->node_cell[mesh->node_cell_start[g->near]], weight);
+        cell = silt_locate_from(mesh, nodes->x, x, mesh->node_cell[mesh->node_cell_start[g->near]], weight);
     if (cell < 0) {
         if (!*located)
             silt_locator_build(&c->locator, mesh, nodes->x, c->scene->fluid.size);
         *located = true;
-        cell = silt_locate(&c->locator, mesh, nodes->x, g->x, weight);
+        cell = silt_locate(&c->locator, mesh, nodes->x, x, weight);
     }
     g->near = cell >= 0 ? mesh->cell[cell][0] : -1;
     return cell;

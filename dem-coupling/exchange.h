@@ -69,7 +69,7 @@ typedef struct silt_exchange {
     double density, viscosity; // of the water
     double gravity[3];
     double width; // m, of the kernel
-    bool layers;  // in the plane: it takes means along x, in layers
+    bool layers;  // it takes means along x (space: and y), in layers
     silt_forces force; // its def; forces besides drag and pressure gradient
     bool refresh; // update also renews the coefficients; the fluid must then read them anew
     // given before prepare
