@@ -67,15 +67,6 @@ static silt_status coupling_shapes(silt_coupling *c, silt_error *err) {
     return SILT_OK;
 }
 
-// the ends of the walls in y: what grains that come in at the other side go between
-static void coupling_sides(silt_coupling *c) {
-    for (int i = 0; i < c->walls->count; i++)
-        for (int k = 0; k < 3; k++) {
-            c->dem_def.lo[1] = silt_min(i + k > 0 ? c->dem_def.lo[1] : HUGE_VAL, c->walls->corner[i][k][1]);
-            c->dem_def.hi[1] = silt_max(i + k > 0 ? c->dem_def.hi[1] : -HUGE_VAL, c->walls->corner[i][k][1]);
-        }
-}
-
 // widths, radii, time step and everything else that the worker is told once
 static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     const silt_scene *scene = c->scene;
@@ -147,6 +138,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
                                              grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     memcpy(c->exchange.gravity, scene->gravity, sizeof c->exchange.gravity);
     c->exchange.layers = grains->kernel_layers;
+    c->exchange.gusts = grains->gusts > 0.0;
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
     const bool space = c->dim == 3, periodic = scene->period[0] < scene->period[1];
@@ -183,7 +175,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .no_contacts = !scene->bed.on || !scene->bed.deposition,
     };
     if (grains->across)
-        coupling_sides(c);
+        silt_coupling_sides(c);
 }
 
 // ---------------------------------------------------------------- grains
@@ -367,11 +359,7 @@ static void coupling_bed_changed(silt_coupling *c, const silt_bed *bed) {
 static int coupling_locate(silt_coupling *c, coupling_grain *g, const silt_nodes *nodes, const silt_mesh *mesh,
                            bool *located, double *weight) {
     int cell = -1;
-    double x[3] = {g->x[0], g->x[1], g->x[2]};
-    if (c->dem_def.across) {
-        const double low = c->dem_def.lo[1], wide = c->dem_def.hi[1] - low;
-        x[1] -= wide * floor((x[1] - low) / wide);
-    }
+    double x[3] = {g->x[0], silt_coupling_across(c, g->x[1]), g->x[2]};
     if (g->near >= 0 && g->near < mesh->n_node && mesh->wet[g->near])
         cell = silt_locate_from(mesh, nodes->x, x, mesh->node_cell[mesh->node_cell_start[g->near]], weight);
     if (cell < 0) {
@@ -407,6 +395,7 @@ static bool coupling_find(silt_coupling *c, const silt_nodes *nodes, const silt_
         memcpy(to->spin, g->omega, sizeof to->spin);
         to->gyration = sqrt(0.4) * g->radius;
         to->held = g->fixed;
+        memcpy(to->gust, g->gust, sizeof to->gust);
         memset(to->force, 0, sizeof to->force);
         memset(to->torque, 0, sizeof to->torque);
         to->cell = coupling_locate(c, g, nodes, mesh, &located, to->weight);
@@ -792,6 +781,7 @@ const silt_coupling_type silt_coupling_dem = {
     .prepare = coupling_prepare,
     .load = coupling_load,
     .walk = silt_coupling_walk,
+    .gusts = silt_coupling_gusts,
     .exchanged = coupling_exchanged,
     .outline = coupling_outline,
     .room = coupling_room,

@@ -477,6 +477,9 @@ static const silt_key grains_rows[] = {
     {"eddy_limit", KEY_NUMBER, .fallback = "0", .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_grains_def, eddy_limit),
      .doc = "share of grains in the water at which eddies have no room: the mixing length counts the way to the wall times 1 - share/limit "
             "(Li and Sawamoto 1995; 0.6); 0: grains do not hinder eddies"},
+    {"gusts", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, gusts),
+     .doc = "how long a gust lasts at a grain, such as the depth of a stream over its mean velocity: the eddies that the mesh does not show, added "
+            "to the water's velocity in the drag (docs/grains.md); 0: none"},
     {"random_walk", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, random_walk),
      .doc = "suspended grains wander with the eddies that the mesh does not show; random numbers by fluid.seed"},
     {"pick_up", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, pick_up),
