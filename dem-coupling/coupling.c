@@ -138,6 +138,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
                                              grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     memcpy(c->exchange.gravity, scene->gravity, sizeof c->exchange.gravity);
     c->exchange.layers = grains->kernel_layers;
+    c->exchange.gusts = grains->gusts > 0.0;
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
     const bool space = c->dim == 3, periodic = scene->period[0] < scene->period[1];
@@ -151,6 +152,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .way_lo = {def->way_lo[0], def->way_lo[1], def->way_lo[2]},
         .way_hi = {def->way_hi[0], def->way_hi[1], def->way_hi[2]},
         .periodic = periodic,
+        .across = grains->across,
         .period = period_share * 2.0 * largest,
         .gravity = {scene->gravity[0], scene->gravity[1], scene->gravity[2]},
         .youngs_modulus = contact->youngs_modulus,
@@ -172,6 +174,8 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .min_radius = smallest,
         .no_contacts = !scene->bed.on || !scene->bed.deposition,
     };
+    if (grains->across)
+        silt_coupling_sides(c);
 }
 
 // ---------------------------------------------------------------- grains
@@ -355,13 +359,14 @@ static void coupling_bed_changed(silt_coupling *c, const silt_bed *bed) {
 static int coupling_locate(silt_coupling *c, coupling_grain *g, const silt_nodes *nodes, const silt_mesh *mesh,
                            bool *located, double *weight) {
     int cell = -1;
+    double x[3] = {g->x[0], silt_coupling_across(c, g->x[1]), g->x[2]};
     if (g->near >= 0 && g->near < mesh->n_node && mesh->wet[g->near])
-        cell = silt_locate_from(mesh, nodes->x, g->x, mesh->node_cell[mesh->node_cell_start[g->near]], weight);
+        cell = silt_locate_from(mesh, nodes->x, x, mesh->node_cell[mesh->node_cell_start[g->near]], weight);
     if (cell < 0) {
         if (!*located)
             silt_locator_build(&c->locator, mesh, nodes->x, c->scene->fluid.size);
         *located = true;
-        cell = silt_locate(&c->locator, mesh, nodes->x, g->x, weight);
+        cell = silt_locate(&c->locator, mesh, nodes->x, x, weight);
     }
     g->near = cell >= 0 ? mesh->cell[cell][0] : -1;
     return cell;
@@ -390,6 +395,7 @@ static bool coupling_find(silt_coupling *c, const silt_nodes *nodes, const silt_
         memcpy(to->spin, g->omega, sizeof to->spin);
         to->gyration = sqrt(0.4) * g->radius;
         to->held = g->fixed;
+        memcpy(to->gust, g->gust, sizeof to->gust);
         memset(to->force, 0, sizeof to->force);
         memset(to->torque, 0, sizeof to->torque);
         to->cell = coupling_locate(c, g, nodes, mesh, &located, to->weight);
@@ -775,6 +781,7 @@ const silt_coupling_type silt_coupling_dem = {
     .prepare = coupling_prepare,
     .load = coupling_load,
     .walk = silt_coupling_walk,
+    .gusts = silt_coupling_gusts,
     .exchanged = coupling_exchanged,
     .outline = coupling_outline,
     .room = coupling_room,

@@ -150,6 +150,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     memcpy(s->gravity, def->gravity, sizeof s->gravity);
     s->dim = def->dim == 3 ? 3 : 2;
     s->periodic = def->periodic;
+    s->across = def->across;
     s->period = def->period;
     s->youngs_modulus = def->youngs_modulus;
     s->wall_modulus = def->wall_modulus > 0 ? def->wall_modulus : def->youngs_modulus;

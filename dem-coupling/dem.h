@@ -19,6 +19,7 @@ typedef struct silt_dem_def {
     double lo[3], hi[3]; // the box (slab: in x and y); a sphere that leaves it is gone
     double way_lo[3], way_hi[3]; // m, what walls that move span in all their motion
     bool periodic;       // in x: what leaves the box there comes in at the other end
+    bool across;         // space: in y too
     double period;       // m, slab: periodic length in z (at least 3 times the largest sphere's diameter)
     double gravity[3];
     double wall_modulus; // Pa, of the walls; 0: youngs_modulus

@@ -57,7 +57,7 @@ typedef struct dem_motion {
 typedef struct dem_shared {
     uint64_t size; // bytes of the memory file; the worker maps again when it grew
     // the numbers of silt_dem_def
-    int dim, periodic;
+    int dim, periodic, across, spare;
     double lo[3], hi[3], way_lo[3], way_hi[3], period, gravity[3];
     double youngs_modulus, wall_modulus, poissons_ratio, restitution, friction, rolling_friction, body_friction;
     double step, max_radius, min_radius;

@@ -334,7 +334,8 @@ static int script_faces(void *lmp, const dem_shared *s, int *plane) {
         if (across < 0)
             continue;
         // what closes the tank at the ends of a period closes nothing
-        if (across == 0 && s->periodic && (t[i][0] < s->lo[0] + tolerance || t[i][0] > s->hi[0] - tolerance)) {
+        if (((across == 0 && s->periodic) || (across == 1 && s->across)) &&
+            (t[i][across] < s->lo[across] + tolerance || t[i][across] > s->hi[across] - tolerance)) {
             plane[i] = -1;
             continue;
         }
@@ -503,7 +504,7 @@ void script_open(void *lmp, const dem_shared *s, const char *restart, int *plane
     script_say(lmp, "units si");
     script_say(lmp, "atom_style sphere");
     script_say(lmp, "atom_modify map array sort 0 0");
-    script_say(lmp, "boundary %c f %c", s->periodic ? 'p' : 'f', s->dim == 3 ? 'f' : 'p');
+    script_say(lmp, "boundary %c %c %c", s->periodic ? 'p' : 'f', s->across ? 'p' : 'f', s->dim == 3 ? 'f' : 'p');
     script_say(lmp, "newton off");
     script_say(lmp, "communicate single vel yes");
     script_say(lmp, "processors 1 1 1");

@@ -21,6 +21,7 @@ typedef struct coupling_grain {
     double torque[3];           // N m/m, the water's, where it is asked for
     double contact[3], net;     // N/m, of the last step
     double old_x[3], old_v[3];  // before the substeps
+    double gust[3];             // m/s, what eddies add to the water's velocity at it in the next step
     int contacts;
     int near; // a node of the water next to it when it was last located, -1: none
     uint8_t on_bed;
@@ -116,6 +117,12 @@ void silt_coupling_hold(silt_coupling *coupling, coupling_grain *grain);
  * the water with its eddies. The random numbers hang on fluid.seed, the step and the grain's id. */
 void silt_coupling_walk(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, const double *viscosity, double dt,
                         int64_t step);
+// gust.c
+/** Gusts at the grains for the step that begins at `time`, after load: 0 where the water has no eddies. Their numbers hang on
+ * fluid.seed, the grain's id and how many gusts it has had. */
+void silt_coupling_gusts(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, const double *viscosity, double time);
+/** Velocities along the stream, across it and up over the local friction velocity. */
+void silt_gust_numbers(uint64_t random, double out[3]);
 /** Tells LIGGGHTS of it. */
 void silt_coupling_shift(silt_coupling *coupling);
 
@@ -128,6 +135,9 @@ bool silt_coupling_left_domain(const silt_coupling *coupling, const coupling_gra
 // walls.c
 void silt_coupling_walls(silt_coupling *coupling);       /**< which of them move, and where all are */
 void silt_coupling_walls_stand(silt_coupling *coupling); /**< where the walls are now is where LIGGGHTS has them */
+/** grains.across: LIGGGHTS' box ends where the walls end in y; and where there a grain is that has gone over an end of it */
+void silt_coupling_sides(silt_coupling *coupling);
+double silt_coupling_across(const silt_coupling *coupling, double y);
 /** from where LIGGGHTS has the walls that move to where they are at the end of the step, in n substeps */
 void silt_coupling_walls_go(silt_coupling *coupling, int n);
 

@@ -4,6 +4,7 @@
 #include "parallel.h"
 #include "remesh.h"
 
+static const double cloud_parts = 17592186044416.0; // 2^44, of a period
 #define WEDGE_LONG 3.5 // times h: longest edge of a cell in a wedge on a wall
 
 static bool polygon_contains(int n, const double *p, double x, double y) {
@@ -318,13 +319,29 @@ static bool cell_is_dent(const silt_mesh *mesh, const int *cell, const double *c
     return false;
 }
 
+// Across a dented surface the cloud's hull has flat cells of any length. Where x is periodic such cells are not the same at both ends, and one
+// of half the period has no nearest copy: none is water.
+static bool cell_straddles(const silt_mesh *mesh, const double *corner, double bound) {
+    return mesh->dim == 3 && mesh->period[0] > 0 && !(enclosing_radius(corner) < 1.5 * bound);
+}
+
+// in whole parts of the period, see cloud_points
+static bool cell_too_long(int n_corner, const int *cell, const double *x, double period) {
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (int a = 0; a < n_corner; a++) {
+        low = silt_min(low, x[(n_corner - 1) * cell[a]]);
+        high = silt_max(high, x[(n_corner - 1) * cell[a]]);
+    }
+    return high - low >= 0.5 * period;
+}
+
 // The live nodes; where x is periodic, nodes nearer to its ends than `margin` are put beyond the other end too. Coordinates are
 // whole parts of the period then: both copies of a cell have the same numbers but for a whole shift, so that ties are broken alike.
 // @param live  out, owned by the caller, the points' nodes, *n_live that are no copies first  @return how many points
 static int cloud_points(const silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const uint8_t *dead,
                         double margin, int **live, double **x, int *n_live) {
     const int n = nodes->count, dim = mesh->dim;
-    const double period = mesh->period[0], parts = 17592186044416.0, scale = period > 0 ? parts / period : 1; // 2^44
+    const double period = mesh->period[0], parts = cloud_parts, scale = period > 0 ? parts / period : 1;
     int m = 0, room = 0, x_room = 0;
     SILT_RESERVE(*live, room, n + 1);
     SILT_RESERVE(*x, x_room, dim * n + 1);
@@ -376,7 +393,7 @@ static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, c
             for (int a = 1; a < n_corner; a++)
                 if (live[cell[a]] < live[cell[lowest]])
                     lowest = a;
-            if (cell[lowest] >= n_live)
+            if (cell[lowest] >= n_live || (mesh->period[0] > 0 && cell_too_long(n_corner, cell, x, cloud_parts)))
                 continue;
             for (int a = 0; a < n_corner; a++)
                 found[n_corner * kept + a] = live[cell[a]];
@@ -537,7 +554,8 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
         bool in = false;
         for (int r = 0; r < scene->fluid.n_region && !in; r++)
             in = silt_region_contains(&scene->fluid.region[r], centre);
-        if (!flat && !(in && shape.radius < 2 * scene->fluid.alpha * h))
+        if ((!flat && !(in && shape.radius < 2 * scene->fluid.alpha * h)) ||
+            (flat && cell_straddles(mesh, corner, scene->fluid.alpha * h)))
             continue;
         SILT_RESERVE(sliver, sliver_capacity, mesh->n_cell + 1);
         sliver[mesh->n_cell] = flat;
@@ -596,6 +614,8 @@ static choice cell_choose(const chooser *c, const int *cell, int before, double 
         return CELL_NO;
     const double bound = scene->fluid.alpha * h;
     const bool round = shape.radius < bound;
+    if (flat && cell_straddles(mesh, corner, bound))
+        return CELL_NO;
     const bool wedge = !round && wedge_cell(mesh, nodes, cell, corner, h) && !(before < 0 && cell_is_dent(mesh, cell, corner));
     if (!(inner || flat || wedge || round || (dim == 3 && enclosing_radius(corner) < bound)))
         return CELL_NO;

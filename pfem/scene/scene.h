@@ -255,7 +255,9 @@ typedef struct silt_grains_def {
     silt_series sieve;    // diameter in m, share of the mass that passes, of the parcels; n_row 0: all alike
     double width;         // m, accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel, or 5 d without bed
     double kernel;        // m, width of the porosity kernel; 0: max(3 d, 2 h)
-    bool kernel_layers;   // the kernel takes means along x in layers, 2-D, default false
+    bool across;          // 3-D, with kernel_layers: what goes through a side of the walls in y comes in at the other, default false
+    double gusts;         // s, 0: none; how long each lasts
+    bool kernel_layers;   // the kernel takes means along x (3-D: and y) in layers, default false
     double added_mass;    // 0, coefficient, of the displaced water's mass; spheres: 0.5
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false

@@ -49,6 +49,9 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     if (scene->grains.kernel_layers && !(scene->period[0] < scene->period[1]))
         silt_complain(reader, silt_tree_item(grains, "kernel_layers"),
                       "key 'grains.kernel_layers': found true, allowed in a periodic scene: its means are taken along the whole of x");
+    if (scene->grains.across && !scene->grains.kernel_layers)
+        silt_complain(reader, silt_tree_item(grains, "across"),
+                      "key 'grains.across': found true, allowed with kernel_layers: true: the water does not repeat in y");
     const silt_tree *regions = silt_tree_item(bed, "regions");
     if (regions && regions->kind == TREE_LIST && regions->n_item == 0)
         silt_complain(reader, regions, "key 'bed.regions': found an empty list, allowed at least one region");

@@ -470,9 +470,12 @@ static const silt_key grains_rows[] = {
      .doc = "accounting width; 0: (2/3)(0.82) d/(1 - n) of the parcel; without a bed 0.91 d with regions (n = 0.4), else 5 d"},
     {"kernel", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, kernel),
      .doc = "width of the porosity kernel; 0: the larger of 3 d and 2 h"},
-    {"kernel_layers", KEY_SWITCH, .fallback = "false", .flags = KEY_PLANE, AT(silt_grains_def, kernel_layers),
-     .doc = "the kernel takes means along the whole of x, in layers as thick as `kernel`: for level beds in periodic channels, whose water is the "
-            "same along x in the mean and changes within a grain's height over the bed"},
+    {"kernel_layers", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, kernel_layers),
+     .doc = "the kernel takes means along the whole of x (3-D: and y), in layers as thick as `kernel`: for level beds in periodic channels, whose "
+            "water is the same along x (and y) in the mean and changes within a grain's height over the bed"},
+    {"across", KEY_SWITCH, .fallback = "false", .flags = KEY_SPACE, AT(silt_grains_def, across),
+     .doc = "grains that go through one end of the walls in y come in at the other: a channel without sides; the water keeps its own, which should "
+            "be slip. Only with kernel_layers, whose means do not know where in y a grain is"},
     {"added_mass", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, added_mass),
      .doc = "share of the displaced water that is accelerated along; spheres: 0.5"},
     {"lift", KEY_WORD, .fallback = "none", .words = lift_words, AT(silt_grains_def, lift), .doc = "force across the water's shear"},
@@ -483,6 +486,9 @@ static const silt_key grains_rows[] = {
     {"eddy_limit", KEY_NUMBER, .fallback = "0", .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_grains_def, eddy_limit),
      .doc = "share of grains in the water at which eddies have no room: the mixing length counts the way to the wall times 1 - share/limit "
             "(Li and Sawamoto 1995; 0.6); 0: grains do not hinder eddies"},
+    {"gusts", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, gusts),
+     .doc = "how long a gust lasts at a grain, such as the depth of a stream over its mean velocity: the eddies that the mesh does not show, added "
+            "to the water's velocity in the drag (docs/grains.md); 0: none"},
     {"random_walk", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, random_walk),
      .doc = "suspended grains wander with the eddies that the mesh does not show; random numbers by fluid.seed"},
     {"pick_up", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, pick_up),
