@@ -8,6 +8,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 // file descriptors that the worker inherits
 enum { DEM_FD_SOCKET = 3, DEM_FD_MEMORY, DEM_FD_RESTART, DEM_FD_FREE };
@@ -108,6 +109,11 @@ static inline uint64_t dem_shared_layout(dem_shared *s) {
     DEM_PLACE(grain, s->max_grain, dem_grain);
 #undef DEM_PLACE
     return end;
+}
+
+/** What silt starts its worker with: a worker of another version, whose memory is laid out differently, does not serve. */
+static inline void dem_serve_word(char word[48]) {
+    snprintf(word, 48, "serve-1-%zu-%zu-%zu-%zu", sizeof(dem_shared), sizeof(dem_body), sizeof(dem_add), sizeof(dem_grain));
 }
 
 #endif

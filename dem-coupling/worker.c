@@ -599,7 +599,13 @@ static void worker_mpi(void) {
 int main(int argc, char **argv) {
     struct stat file;
 
-    if (argc != 3 || strcmp(argv[1], "serve") != 0 || fstat(DEM_FD_SOCKET, &file) != 0 || !S_ISSOCK(file.st_mode)) {
+    char word[48];
+    dem_serve_word(word);
+    if (argc == 3 && strncmp(argv[1], "serve", 5) == 0 && strcmp(argv[1], word) != 0) {
+        fprintf(stderr, "this silt-dem is of another version than the silt that started it (asked for: %s, here: %s)\n", argv[1], word);
+        return 2;
+    }
+    if (argc != 3 || strcmp(argv[1], word) != 0 || fstat(DEM_FD_SOCKET, &file) != 0 || !S_ISSOCK(file.st_mode)) {
         fprintf(stderr, "silt-dem is the worker that silt starts for grains and bodies; it cannot be used by hand\n");
         return 2;
     }
@@ -613,11 +619,11 @@ int main(int argc, char **argv) {
     worker_mpi();
 
     for (double told = 0;;) {
-        char word = 0;
-        ssize_t got = recv(DEM_FD_SOCKET, &word, 1, 0);
+        char byte = 0;
+        ssize_t got = recv(DEM_FD_SOCKET, &byte, 1, 0);
         if (got < 0 && errno == EINTR)
             continue;
-        if (got != 1 || word == DEM_CLOSE)
+        if (got != 1 || byte == DEM_CLOSE)
             break;
         worker_map();
         worker.shared->text[0] = 0;
@@ -626,19 +632,19 @@ int main(int argc, char **argv) {
             if (ftruncate(fileno(worker.screen), 0) != 0)
                 worker_fail("memory file: %s", strerror(errno));
         }
-        if (word == DEM_OPEN)
+        if (byte == DEM_OPEN)
             worker_open();
-        else if (word == DEM_BODIES)
+        else if (byte == DEM_BODIES)
             worker_bodies();
-        else if (word == DEM_RUN)
+        else if (byte == DEM_RUN)
             worker_run();
-        else if (word == DEM_SAVE)
+        else if (byte == DEM_SAVE)
             worker_save();
         const double cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID);
         worker.shared->cpu_all = cpu - told;
         told = cpu;
-        word = DEM_DONE;
-        if (send(DEM_FD_SOCKET, &word, 1, MSG_NOSIGNAL) != 1)
+        byte = DEM_DONE;
+        if (send(DEM_FD_SOCKET, &byte, 1, MSG_NOSIGNAL) != 1)
             break;
     }
     if (worker.lmp)

@@ -52,8 +52,22 @@ static void draw_vorticity(silt_grid *grid) {
     free(curl);
 }
 
+const char *silt_draw_grain_array(const silt_draw_canvas *c) {
+    return !c->scene->fluid.on && strcmp(c->field->name, "speed") == 0 ? c->field->water : NULL;
+}
+
+// the part of the picture that a file of a frame belongs to
+static silt_draw_part draw_part(const char *part) {
+    return strcmp(part, "bed") == 0      ? DRAW_BED
+           : strcmp(part, "grains") == 0 ? DRAW_GRAINS
+           : strcmp(part, "bodies") == 0 ? DRAW_BODIES
+                                         : DRAW_WATER;
+}
+
 bool silt_draw_read(const silt_draw_canvas *c, silt_grid *grid, const char *part, int number, const char *array) {
-    if (!silt_grid_read(grid, c->out, part, number, array))
+    const silt_draw_part shown = draw_part(part);
+    memset(grid, 0, sizeof *grid);
+    if (!silt_draw_shows(c, shown) || !silt_grid_read(grid, c->out, part, number, array))
         return false;
     if (array && c->field->made == MADE_ELEVATION) {
         free(grid->value);
@@ -69,7 +83,9 @@ bool silt_draw_read(const silt_draw_canvas *c, silt_grid *grid, const char *part
         }
     }
     grid->width = grid->value ? 1 : 0;
-    if (c->slice)
+    if (c->slice && shown == DRAW_GRAINS)
+        silt_draw_slice_grains(c, grid);
+    else if (c->slice && shown != DRAW_BODIES)
         silt_draw_slice(c, grid);
     return true;
 }

@@ -1,5 +1,4 @@
 // silt bench: the time loop's own steps, timed by its own clocks; every scene and size in a process of its own
-#include <dirent.h>
 #include <errno.h>
 #include <malloc.h>
 #include <signal.h>
@@ -226,16 +225,6 @@ static silt_status measure_run(silt_run *run, double started, bench_row *row, si
 
 // ---------------------------------------------------------------- a scene at a size
 
-static void folder_remove(const char *path) {
-    DIR *folder = opendir(path);
-    for (struct dirent *entry; folder && (entry = readdir(folder));)
-        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
-            unlinkat(dirfd(folder), entry->d_name, 0);
-    if (folder)
-        closedir(folder);
-    rmdir(path);
-}
-
 static silt_status row_measure(const silt_bench_def *def, const char *folder, bench_row *row, silt_error *err) {
     const bench_scene *kind = bench_scene_find(row->name);
     const silt_run_def run_def = {.quiet = true, .threads = row->threads, .worker = def->worker};
@@ -318,7 +307,7 @@ static silt_status row_fork(const silt_bench_def *def, bench_row *row, silt_erro
     for (int k = 0; k < 2; k++)
         if (ends[k] >= 0)
             close(ends[k]);
-    folder_remove(folder);
+    silt_folder_remove(folder);
     free(folder);
     free(answer);
     return status;

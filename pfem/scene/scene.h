@@ -426,6 +426,7 @@ struct silt_scene {
         double step;           // s, largest dt; 0: none
         double cfl;            // share of a cell that a node may cross in a step
         double checkpoint;     // s of model time between checkpoints, 0: 10 outputs
+        double wall;           // s on the clock of the wall that a process may take, then it stops with a checkpoint; 0: no limit
         int64_t steps;         // most steps, 0: no limit
         int retries;           // how often a failed step is halved
     } time;

@@ -101,6 +101,8 @@ static const silt_key time_rows[] = {
      .doc = "share of a cell that a node may cross in a step"},
     {"checkpoint", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_scene, time.checkpoint),
      .doc = "time between checkpoints; 0: ten outputs"},
+    {"wall", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_scene, time.wall),
+     .doc = "seconds of the wall's clock after which a process stops with a checkpoint and exit code 3, as after SIGTERM; 0: no limit"},
     {"steps", KEY_LONG, .fallback = "0", RANGE(0, 1e15), AT(silt_scene, time.steps), .doc = "most steps; 0: no limit"},
     {"retries", KEY_INTEGER, .fallback = "8", RANGE(0, 30), AT(silt_scene, time.retries),
      .doc = "how often a failed step is halved"},
