@@ -63,7 +63,7 @@ typedef struct dem_shared {
     double step, max_radius, min_radius;
     int resume, no_contacts;
     // lengths of the sections
-    int n_wall, n_triangle, n_motion, n_body, n_body_sphere, n_remove, n_add, n_force, n_torque, n_shift, max_grain;
+    int n_wall, n_triangle, n_motion, n_body, n_body_sphere, n_remove, n_add, n_force, n_torque, n_shift, n_guide, max_grain;
     int n_step;
     int keep; // 1: this run may go on from the last one's end
     // answer
@@ -83,6 +83,7 @@ typedef struct dem_shared {
     uint64_t force;       // 3 double per grain of the last answer, in its order
     uint64_t torque;      // 3 double per grain, alike
     uint64_t shift;       // 3 double per grain, alike
+    uint64_t guide;       // n_guide bytes, see guide.h
     uint64_t grain;       // dem_grain, rising tags (answer)
 } dem_shared;
 
@@ -104,6 +105,7 @@ static inline uint64_t dem_shared_layout(dem_shared *s) {
     DEM_PLACE(force, 3 * s->n_force, double);
     DEM_PLACE(torque, 3 * s->n_torque, double);
     DEM_PLACE(shift, 3 * s->n_shift, double);
+    DEM_PLACE(guide, s->n_guide, char);
     DEM_PLACE(grain, s->max_grain, dem_grain);
 #undef DEM_PLACE
     return end;

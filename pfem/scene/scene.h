@@ -293,7 +293,24 @@ typedef enum {
     SHAPE_POLYGON, // points relative to any origin, simple polygon; scaled so that its width is `scale` if scale > 0
     SHAPE_TEMPLE,  // columns under a roof, width `scale`; made in dem-coupling/shape.c
 } silt_shape;
-typedef enum { MOTION_FREE = 0, MOTION_FIXED } silt_motion;
+typedef enum { MOTION_FREE = 0, MOTION_FIXED, MOTION_PRESCRIBED } silt_motion;
+/** components of a body's motion, bits of silt_body_def.held */
+enum { HELD_X = 1, HELD_Y = 2, HELD_Z = 4, HELD_ANGLE = 8, HELD_ALL = 15 };
+/** a spring or line between a point of the body and a point in space */
+typedef struct silt_spring_def {
+    double at[3];     // m, the point of the body where it is at the start
+    double to[3];     // m
+    double stiffness; // N/m; 2-D: per metre of width, as all forces
+    double damping;   // N s/m, of the speed at which its length changes
+    double length;    // m, at rest; after reading never NaN
+    bool line;        // pulls, does not push
+} silt_spring_def;
+/** until when a body is held */
+typedef struct silt_release_def {
+    bool on;
+    double time;  // s; NaN: not by time
+    double force; // N, of all that acts on it; NaN: not by force
+} silt_release_def;
 typedef struct silt_body_def {
     char *name; // [a-z][a-z0-9_]*, unique
     silt_shape shape;
@@ -304,6 +321,13 @@ typedef struct silt_body_def {
     double density; // kg/m3
     double velocity[3];
     silt_motion motion;
+    silt_series path;  // MOTION_PRESCRIBED: a path (silt_path_at)
+    double path_scale; // 1, factor on the numbers of its file
+    silt_baseline baseline; // of accelerations
+    int held;          // HELD_ bits: components of the motion that are none
+    int n_spring;
+    silt_spring_def *spring; // owned
+    silt_release_def release;
     int n_point;
     double *point; // owned, polygon only, 3 per point, counter-clockwise after reading
 } silt_body_def;

@@ -16,6 +16,7 @@ typedef enum {
     KEY_LONG,       // int64_t
     KEY_SWITCH,     // bool
     KEY_WORD,       // int (an enum), one of words
+    KEY_SET,        // int, bits of any of words
     KEY_SIGN,       // double, one of words
     KEY_TEXT,       // char *
     KEY_NAME,       // char *, letters, digits, underscores
@@ -185,6 +186,8 @@ void silt_scene_check(silt_reader *reader, silt_scene *scene);
 void silt_scene_check_openings(silt_reader *reader, const silt_scene *scene, const double lo[3], const double hi[3]);
 /** true where a grain of that radius at x touches no wall, bed or body */
 typedef bool silt_fill_clear(const void *context, const double *x, double radius);
+/** What moves bodies (scene_motion.c). */
+void silt_scene_check_motion(silt_reader *reader, const silt_scene *scene);
 /** Fills grains.regions into grains.filled; a complaint where more is asked for than fits (fill.c). */
 void silt_scene_fill(silt_reader *reader, silt_scene *scene, silt_fill_clear *clear, const void *context);
 /** the resolved scene as YAML; owned by the caller. names: files with their folder (true), or their last part only */
