@@ -26,7 +26,7 @@ static double grain_radius[] = {0.1, 0.05};
 
 static double outline[] = {-0.2, -0.1, 0.2, -0.1, 0.2, 0.1, -0.2, 0.1};
 // turned by a right angle
-static struct silt_body block = {.x = {1.5, 0.5, 0}, .v = {1, 0, 0}, .w = {0, 0, 2}, .n_point = 4, .outline = outline};
+static struct silt_body block = {.x = {1.5, 0.5, 0}, .v = {1, 0, 0}, .w = {0, 0, 2}, .n_point = 4, .point = outline};
 
 typedef struct world {
     silt_scene scene;
