@@ -104,7 +104,7 @@ static double clump_gap(const silt_clump *clump, const silt_solid *skin) {
 
 double silt_form_clump_error(const silt_clump *clump, const silt_solid *solid) {
     silt_solid skin;
-    if (silt_solid_mesh(solid, silt_clamp(0.9 * clump->smallest, solid->radius / 30, solid->radius / 15), "clump", &skin, NULL) != SILT_OK)
+    if (silt_solid_mesh(solid, silt_clamp(0.9 * clump->smallest, solid->radius / 20, solid->radius / 15), "clump", &skin, NULL) != SILT_OK)
         return HUGE_VAL;
     const double error = clump_gap(clump, &skin);
     silt_solid_clear(&skin);

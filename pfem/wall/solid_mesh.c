@@ -9,7 +9,7 @@
 #define MESH_TARGET 0.92
 static const double mesh_bend = 0.93969262078590842; // cosine of 20 degrees
 static const double mesh_turn = 0.4;                 // least cosine between a face before and after an edit
-enum { MESH_ROUNDS = 8, MESH_PASSES = 60 };
+enum { MESH_ROUNDS = 6, MESH_PASSES = 60 };
 
 typedef enum { POINT_SMOOTH = 0, POINT_LINE, POINT_CORNER } point_kind;
 
@@ -619,7 +619,7 @@ silt_status silt_solid_mesh(const silt_solid *fine, double h, const char *what, 
     for (int round = 0; round < MESH_ROUNDS; round++) {
         for (int pass = 0; pass < MESH_PASSES && shell_split(&s); pass++)
             ;
-        for (int pass = 0; pass < MESH_PASSES && shell_contract(&s); pass++)
+        for (int pass = 0; pass < MESH_PASSES && shell_contract(&s) > (round < MESH_ROUNDS - 2 ? s.n_face / 800 : 0); pass++)
             ;
         for (int pass = 0; pass < 4 && shell_turn(&s); pass++)
             ;
