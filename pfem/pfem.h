@@ -395,6 +395,7 @@ typedef struct silt_body_state {
                                        // counter-clockwise
         int n_face;
         const int (*face)[3];          // 3-D: triangles of points, counter-clockwise from outside, borrowed
+        const struct silt_solid *solid; // 3-D: the same surface to search in (solid.h), borrowed
     } *body; // owned by the coupling
 } silt_body_state;
 
