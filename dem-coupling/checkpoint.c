@@ -136,6 +136,8 @@ silt_status silt_checkpoint_save(silt_coupling *c, silt_store *store, silt_error
                                 err);
     if (status == SILT_OK && c->exchange.gusts)
         status = checkpoint_gusts(c, true, store, err);
+    if (status == SILT_OK)
+        status = silt_coupling_freed(c, true, store, err);
     checkpoint_rows_clear(&r);
     return status;
 }
@@ -151,6 +153,8 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     if (status == SILT_OK && c->n_motion > 0)
         status = silt_store_take(store, "coupling/wall", STORE_DOUBLE, sizeof *c->centre / sizeof(double) * (size_t)c->n_motion,
                                  c->towards, err);
+    if (status == SILT_OK)
+        status = silt_coupling_freed(c, false, store, err);
     if (status != SILT_OK)
         goto done;
     silt_coupling_walls_stand(c);

@@ -52,12 +52,14 @@ static silt_status coupling_shapes(silt_coupling *c, silt_error *err) {
         SILT_TRY(silt_outline_create(&body->shape, def, err));
         silt_clump_create(&body->clump, &body->shape, 0.0, clump_spacing);
         body->fixed = def->motion == MOTION_FIXED;
+        double place[4];
+        silt_coupling_place(c, i, 0.0, place);
         for (int k = 0; k < 2; k++) {
-            state->x[k] = def->at[k];
+            state->x[k] = place[k];
             state->v[k] = body->fixed ? 0.0 : def->velocity[k];
         }
-        state->q[0] = cos(def->angle * M_PI / 360.0);
-        state->q[3] = sin(def->angle * M_PI / 360.0);
+        state->q[0] = cos(place[3] / 2.0);
+        state->q[3] = sin(place[3] / 2.0);
         state->mass = def->density * body->shape.area;
         state->inertia[2] = def->density * body->shape.inertia;
         state->volume = body->shape.area;
@@ -526,6 +528,7 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     c->elapsed = n * c->step;
     if (n > 0)
         silt_coupling_walls_go(c, n);
+    silt_coupling_guide(c, n);
     return silt_dem_start(c->dem, n, c->force, c->body_force, c->body_torque, err);
 }
 
@@ -575,6 +578,7 @@ static silt_status coupling_complete(const silt_coupling *c, const silt_dem_stat
 static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
     SILT_TRY(silt_dem_wait(c->dem, err));
     const silt_dem_state *state = silt_dem_state_now(c->dem);
+    silt_coupling_guided(c);
     SILT_TRY(coupling_complete(c, state, err));
     memset(c->contact, 0, sizeof c->contact);
     if (c->elapsed > 0.0)
@@ -710,6 +714,7 @@ static void coupling_close(silt_coupling **coupling) {
     silt_dem_close(&c->dem);
     free(c->wall);
     free(c->triangle);
+    free(c->guide);
     for (int i = 0; i < c->bodies->count; i++) {
         silt_outline_clear(&c->body[i].shape);
         silt_clump_clear(&c->body[i].clump);

@@ -1,6 +1,7 @@
 #include "dem.h"
 
 #include "dem_check.h"
+#include "guide.h"
 #include "link.h"
 
 // a body as it was given, with what its pose is measured from
@@ -28,6 +29,8 @@ struct silt_dem {
     int n_remove, cap_remove, n_add, cap_add;
     int64_t *remove;      // owned
     silt_dem_sphere *add; // owned
+    int n_guide; // bytes of guide
+    const void *guide; // borrowed, of the next run
     const double *torque, *shift; // borrowed, of the next run, NULL: none
     double (*rate)[4]; // owned, velocity and spin of every motion
     int n_solid, cap_solid, n_free, n_free_sphere;
@@ -42,11 +45,6 @@ struct silt_dem {
     uint8_t *on_bed;
     double *body_x, *body_v, *body_omega, *body_q;
 };
-
-double silt_dem_rayleigh(double radius, double density, double youngs_modulus, double poissons_ratio) {
-    double shear = youngs_modulus / (2 * (1 + poissons_ratio));
-    return M_PI * radius * sqrt(density / shear) / (0.1631 * poissons_ratio + 0.8766);
-}
 
 const silt_dem_state *silt_dem_state_now(const silt_dem *dem) {
     return &dem->state;
@@ -168,7 +166,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->no_contacts = def->no_contacts;
     s->n_body = bodies ? dem->n_free : 0;
     s->n_body_sphere = bodies ? dem->n_free_sphere : 0;
-    s->n_remove = s->n_add = s->n_force = s->n_torque = s->n_shift = 0;
+    s->n_remove = s->n_add = s->n_force = s->n_torque = s->n_shift = s->n_guide = 0;
     s->max_grain = max_grain;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
@@ -531,6 +529,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     s->n_force = force ? dem->state.n_grain : 0;
     s->n_torque = dem->torque ? dem->state.n_grain : 0;
     s->n_shift = dem->shift ? dem->state.n_grain : 0;
+    s->n_guide = dem->n_guide;
     s->max_grain = n_grain + dem->n_add;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
@@ -544,7 +543,10 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         memcpy(DEM_SECTION(s, double, torque), dem->torque, 3 * (size_t)s->n_torque * sizeof(double));
     if (dem->shift)
         memcpy(DEM_SECTION(s, double, shift), dem->shift, 3 * (size_t)s->n_shift * sizeof(double));
+    if (dem->n_guide)
+        memcpy(DEM_SECTION(s, char, guide), dem->guide, (size_t)dem->n_guide);
     dem->torque = dem->shift = NULL;
+    dem->n_guide = 0;
     for (int k = 0; k < dem->n_solid; k++) {
         if (dem->solid[k].slot < 0)
             continue;
@@ -560,8 +562,11 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
 void silt_dem_twist(silt_dem *dem, const double *torque) { dem->torque = torque; }
 void silt_dem_shift(silt_dem *dem, const double *shift) { dem->shift = shift; }
 
-void silt_dem_keep(silt_dem *dem) {
-    dem->keep = true;
+void silt_dem_keep(silt_dem *dem) { dem->keep = true; }
+
+void silt_dem_guide(silt_dem *dem, const void *guide, size_t size) { dem->guide = guide, dem->n_guide = (int)size; }
+const dem_guide *silt_dem_guided(const silt_dem *dem) {
+    return dem->link.shared->n_guide ? DEM_SECTION(dem->link.shared, const dem_guide, guide) : NULL;
 }
 
 silt_status silt_dem_wait(silt_dem *dem, silt_error *err) {

@@ -97,6 +97,10 @@ void silt_dem_twist(silt_dem *dem, const double *torque);
  * plane from x to y, in space from x to z; and where they stand at the end of the next run, the numbers of the definition's walls or
  * triangles. */
 void silt_dem_move_walls(silt_dem *dem, const double (*rate)[4], const double *wall);
+/** What guides bodies and walls in the next run, as guide.h has it; borrowed until then */
+void silt_dem_guide(silt_dem *dem, const void *guide, size_t size);
+/** the same after the run, with the worker's answers; NULL: there was none */
+const struct dem_guide *silt_dem_guided(const silt_dem *dem);
 /** Steps aside before the next run, 3 per grain in the order of the last state, m; borrowed until then */
 void silt_dem_shift(silt_dem *dem, const double *shift);
 /** The next run may go on from where the last one ended, with its neighbour lists and without a set-up. A run is set up all the

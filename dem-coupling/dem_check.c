@@ -47,3 +47,8 @@ silt_status silt_dem_check(const silt_dem_def *def, silt_error *err) {
             return silt_fail(err, SILT_FAILED, "discrete elements: triangle %d of the walls is not finite", k);
     return SILT_OK;
 }
+
+double silt_dem_rayleigh(double radius, double density, double youngs_modulus, double poissons_ratio) {
+    double shear = youngs_modulus / (2 * (1 + poissons_ratio));
+    return M_PI * radius * sqrt(density / shear) / (0.1631 * poissons_ratio + 0.8766);
+}

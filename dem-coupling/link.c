@@ -240,7 +240,9 @@ silt_status dem_link_open(dem_link *link, const char *worker, const char *log_pa
     posix_spawn_file_actions_adddup2(&action, link->restart, DEM_FD_RESTART);
     posix_spawn_file_actions_addclosefrom_np(&action, DEM_FD_FREE);
     snprintf(parent, sizeof parent, "%d", (int)getpid());
-    char *argument[] = {(char *)(uintptr_t)worker, "serve", parent, NULL};
+    char word[48];
+    dem_serve_word(word);
+    char *argument[] = {(char *)(uintptr_t)worker, word, parent, NULL};
     code = posix_spawn(&link->process, worker, &action, &attribute, argument, environ);
     if (code != 0) {
         link->process = 0;

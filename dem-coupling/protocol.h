@@ -8,6 +8,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 // file descriptors that the worker inherits
 enum { DEM_FD_SOCKET = 3, DEM_FD_MEMORY, DEM_FD_RESTART, DEM_FD_FREE };
@@ -62,7 +63,7 @@ typedef struct dem_shared {
     double step, max_radius, min_radius;
     int resume, no_contacts;
     // lengths of the sections
-    int n_wall, n_triangle, n_motion, n_body, n_body_sphere, n_remove, n_add, n_force, n_torque, n_shift, max_grain;
+    int n_wall, n_triangle, n_motion, n_body, n_body_sphere, n_remove, n_add, n_force, n_torque, n_shift, n_guide, max_grain;
     int n_step;
     int keep; // 1: this run may go on from the last one's end
     // answer
@@ -82,6 +83,7 @@ typedef struct dem_shared {
     uint64_t force;       // 3 double per grain of the last answer, in its order
     uint64_t torque;      // 3 double per grain, alike
     uint64_t shift;       // 3 double per grain, alike
+    uint64_t guide;       // n_guide bytes, see guide.h
     uint64_t grain;       // dem_grain, rising tags (answer)
 } dem_shared;
 
@@ -103,9 +105,15 @@ static inline uint64_t dem_shared_layout(dem_shared *s) {
     DEM_PLACE(force, 3 * s->n_force, double);
     DEM_PLACE(torque, 3 * s->n_torque, double);
     DEM_PLACE(shift, 3 * s->n_shift, double);
+    DEM_PLACE(guide, s->n_guide, char);
     DEM_PLACE(grain, s->max_grain, dem_grain);
 #undef DEM_PLACE
     return end;
+}
+
+/** What silt starts its worker with: a worker of another version, whose memory is laid out differently, does not serve. */
+static inline void dem_serve_word(char word[48]) {
+    snprintf(word, 48, "serve-1-%zu-%zu-%zu-%zu", sizeof(dem_shared), sizeof(dem_body), sizeof(dem_add), sizeof(dem_grain));
 }
 
 #endif

@@ -399,7 +399,7 @@ static int script_moving(void *lmp, const dem_shared *s, int *plane, FILE *names
     const dem_motion *motion = DEM_SECTION(s, const dem_motion, motion);
     char path[128];
     script_wall_path(path);
-    script_motion(lmp, s);
+    script_motion(lmp, s, NULL);
     for (int m = 0; m < s->n_motion; m++) {
         if (!script_surface(s, m, plane, path))
             continue;
@@ -415,14 +415,11 @@ static int script_moving(void *lmp, const dem_shared *s, int *plane, FILE *names
 }
 
 // LIGGGHTS knows variables by their place in its list, and puts one that is given anew at the end: all of them are, in the same order
-void script_motion(void *lmp, const dem_shared *s) {
-    const dem_motion *motion = DEM_SECTION(s, const dem_motion, motion);
-    for (int m = 0; m < s->n_motion; m++) {
-        script_say(lmp, "variable x%d equal %.17g", m, motion[m].velocity[0]);
-        script_say(lmp, "variable y%d equal %.17g", m, motion[m].velocity[1]);
-        script_say(lmp, "variable z%d equal %.17g", m, motion[m].velocity[2]);
-        script_say(lmp, "variable w%d equal %.17g", m, motion[m].spin);
-    }
+void script_motion(void *lmp, const dem_shared *s, const double (*rate)[4]) {
+    static const char name[4] = {'x', 'y', 'z', 'w'};
+    for (int m = 0; m < s->n_motion; m++)
+        for (int k = 0; k < 4; k++)
+            script_say(lmp, "variable %c%d equal %.17g", name[k], m, rate ? rate[m][k] : 0);
 }
 
 static void script_walls(void *lmp, const dem_shared *s, int *plane) {
@@ -576,7 +573,9 @@ void script_integrate(void *lmp, const dem_shared *s, const char *path, int fd) 
 
 void script_insert(void *lmp, const dem_shared *s, int k) {
     const dem_body *b = &DEM_SECTION(s, const dem_body, body)[k];
-    script_say(lmp, "region rg sphere %.17g %.17g 0 1e-15 volume_limit 1e-60 units box", b->x[0], b->x[1]);
+    // a place within rounding; far out that is more
+    const double far = fmax(fabs(b->x[0]), fabs(b->x[1]));
+    script_say(lmp, "region rg sphere %.17g %.17g 0 %.17g volume_limit 1e-60 units box", b->x[0], b->x[1], far < 8 ? 1e-15 : 1e-15 * far);
     script_say(
         lmp,
         "fix in all insert/pack seed %d distributiontemplate pd%d maxattempt 5 verbose no insert_every once "

@@ -44,6 +44,7 @@ typedef struct coupling_body {
     silt_outline shape;
     silt_clump clump;
     bool fixed;
+    bool freed; // its release has come
     double old_v[3];
 } coupling_body;
 
@@ -62,6 +63,9 @@ struct silt_coupling {
     double (*towards)[4];    // owned, where it has it after the substeps
     double (*pivot)[3];      // owned, centre without the angle
     double (*rate)[4];       // owned, m/s and rad/s
+    bool accelerates;        // one of them does so within a step: its rate is told substep by substep
+    unsigned char *guide;    // owned, what the worker is told besides forces (guide.h)
+    int guide_capacity;
     double width;            // m, accounting width: spheres stand for what is in this width of the slab; 1 in space
     double step;             // s, of the discrete elements
     double parcel;           // m, usual radius of a parcel, 0 without bed
@@ -140,6 +144,18 @@ void silt_coupling_sides(silt_coupling *coupling);
 double silt_coupling_across(const silt_coupling *coupling, double y);
 /** from where LIGGGHTS has the walls that move to where they are at the end of the step, in n substeps */
 void silt_coupling_walls_go(silt_coupling *coupling, int n);
+
+/** the rates of motion m in each of n substeps, which end where it stands at the end of the step: m/s and rad/s */
+void silt_coupling_wall_rates(silt_coupling *coupling, int m, int n, double (*rate)[4]);
+// guide.c
+/** Tells the worker what guides bodies and walls in the next n substeps; nothing where nothing does. After silt_coupling_walls_go. */
+void silt_coupling_guide(silt_coupling *coupling, int n);
+/** after the run: who was set free */
+void silt_coupling_guided(silt_coupling *coupling);
+/** to and from a checkpoint: who was */
+silt_status silt_coupling_freed(silt_coupling *coupling, bool out, silt_store *store, silt_error *err);
+/** where the path of a prescribed body has it at a time: x, y, z in m, angle in radians */
+void silt_coupling_place(const silt_coupling *coupling, int body, double time, double place[4]);
 
 /** Grains, frozen spheres, bodies and counters to and from the store, under "coupling/"; all that is saved was sent.
  * Errors (SILT_FAILED): an array that is absent or has another length, naming it. */

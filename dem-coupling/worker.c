@@ -1,6 +1,7 @@
 /* silt-dem: the program that links LIGGGHTS. Started by silt (dem.c) with a socket, the shared memory and a restart
  * file open; it does one instruction after the other until it is told to end or its parent is gone. */
 #define _GNU_SOURCE
+#include "motion.h"
 #include "script.h"
 #include "touch.h"
 
@@ -44,6 +45,7 @@ static struct {
     double *body_state; // owned, scratch, 3 per body
     double **body_row;  // owned, rows of body_state
     FILE *screen;       // closed by LIGGGHTS, NULL while it is the log
+    double (*rate)[4];  // owned, velocity and spin of every motion of the walls
     int settled;        // forces and neighbour lists are those of the present state
 } worker;
 
@@ -468,9 +470,36 @@ static void worker_set_up(void) {
     worker.settled = 1;
 }
 
+static dem_guide *worker_guide(void) {
+    return worker.shared->n_guide ? DEM_SECTION(worker.shared, dem_guide, guide) : NULL;
+}
+
+// how the walls move in the substeps from this one on
+static void worker_walls(int substep) {
+    const dem_shared *s = worker.shared;
+    const dem_motion *motion = DEM_SECTION(s, const dem_motion, motion);
+    dem_guide *guide = worker_guide();
+    worker.rate = worker_grow(worker.rate, (size_t)s->n_motion, sizeof *worker.rate);
+    for (int m = 0; m < s->n_motion; m++) {
+        memcpy(worker.rate[m], motion[m].velocity, 3 * sizeof(double));
+        worker.rate[m][3] = motion[m].spin;
+        if (guide && m < guide->n_wall)
+            memcpy(worker.rate[m], dem_guide_wall(guide, m)[substep], sizeof worker.rate[m]);
+    }
+    script_motion(worker.lmp, s, (const double(*)[4])worker.rate);
+}
+
 static void worker_advance(int n_step) {
     const double since = worker_seconds(CLOCK_MONOTONIC), cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID);
-    script_run(worker.lmp, n_step);
+    const dem_guide *guide = worker_guide();
+    motion_run();
+    if (guide && guide->n_wall)
+        for (int k = 0; k < n_step; k++) {
+            worker_walls(k);
+            script_run(worker.lmp, 1);
+        }
+    else
+        script_run(worker.lmp, n_step);
     worker.shared->seconds = worker_seconds(CLOCK_MONOTONIC) - since;
     worker.shared->cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID) - cpu;
 }
@@ -499,13 +528,15 @@ static void worker_run(void) {
         worker.settled = 0;
     if (s->n_step > 0) {
         worker_load();
-        script_motion(worker.lmp, s);
+        worker_walls(0);
+        motion_begin(worker_guide(), s);
     }
     // the multisphere bodies' sums of forces cannot be reached: they are set up for every run (ten thousand grains: 5 ms)
     if (!worker.settled && (s->n_step > 0 || s->n_remove || s->n_add))
         worker_set_up();
     if (s->n_step > 0)
         worker_advance(s->n_step);
+    motion_end();
     worker_answer();
 }
 
@@ -568,7 +599,13 @@ static void worker_mpi(void) {
 int main(int argc, char **argv) {
     struct stat file;
 
-    if (argc != 3 || strcmp(argv[1], "serve") != 0 || fstat(DEM_FD_SOCKET, &file) != 0 || !S_ISSOCK(file.st_mode)) {
+    char word[48];
+    dem_serve_word(word);
+    if (argc == 3 && strncmp(argv[1], "serve", 5) == 0 && strcmp(argv[1], word) != 0) {
+        fprintf(stderr, "this silt-dem is of another version than the silt that started it (asked for: %s, here: %s)\n", argv[1], word);
+        return 2;
+    }
+    if (argc != 3 || strcmp(argv[1], word) != 0 || fstat(DEM_FD_SOCKET, &file) != 0 || !S_ISSOCK(file.st_mode)) {
         fprintf(stderr, "silt-dem is the worker that silt starts for grains and bodies; it cannot be used by hand\n");
         return 2;
     }
@@ -582,11 +619,11 @@ int main(int argc, char **argv) {
     worker_mpi();
 
     for (double told = 0;;) {
-        char word = 0;
-        ssize_t got = recv(DEM_FD_SOCKET, &word, 1, 0);
+        char byte = 0;
+        ssize_t got = recv(DEM_FD_SOCKET, &byte, 1, 0);
         if (got < 0 && errno == EINTR)
             continue;
-        if (got != 1 || word == DEM_CLOSE)
+        if (got != 1 || byte == DEM_CLOSE)
             break;
         worker_map();
         worker.shared->text[0] = 0;
@@ -595,19 +632,19 @@ int main(int argc, char **argv) {
             if (ftruncate(fileno(worker.screen), 0) != 0)
                 worker_fail("memory file: %s", strerror(errno));
         }
-        if (word == DEM_OPEN)
+        if (byte == DEM_OPEN)
             worker_open();
-        else if (word == DEM_BODIES)
+        else if (byte == DEM_BODIES)
             worker_bodies();
-        else if (word == DEM_RUN)
+        else if (byte == DEM_RUN)
             worker_run();
-        else if (word == DEM_SAVE)
+        else if (byte == DEM_SAVE)
             worker_save();
         const double cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID);
         worker.shared->cpu_all = cpu - told;
         told = cpu;
-        word = DEM_DONE;
-        if (send(DEM_FD_SOCKET, &word, 1, MSG_NOSIGNAL) != 1)
+        byte = DEM_DONE;
+        if (send(DEM_FD_SOCKET, &byte, 1, MSG_NOSIGNAL) != 1)
             break;
     }
     if (worker.lmp)

@@ -39,6 +39,10 @@ char *silt_text(const char *format, ...) __attribute__((format(printf, 1, 2))); 
 /** SILT_RESERVE(p, cap, need): p grows to hold need items */
 #define SILT_RESERVE(p, capacity, need) ((p) = silt_grow((p), &(capacity), (need), sizeof *(p)))
 
+/** A module of the program by its file name, beside it or in ../libexec/silt as the worker is (of a test: one folder up).
+ * @return NULL and why; opened once more it is the same */
+void *silt_module_open(const char *name, char why[512]);
+
 double silt_seconds(void);                                       /**< monotonic wall clock, s */
 
 /** What a step's time goes to. One clock runs at any time, so that they add up to the step; each thread has its own. */

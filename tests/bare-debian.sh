@@ -5,16 +5,18 @@ set -euo pipefail
 
 usage() {
     cat <<'END'
-usage: tests/bare-debian.sh [--keep] [--reuse] [--tree] [--only test|demo] [FOLDER]
+usage: tests/bare-debian.sh [--keep] [--reuse] [--tree] [--only test|demo] [--package FILE.deb] [FOLDER]
   FOLDER    where the file system goes; default: a new one under /var/tmp
   --keep    leave it there in the end (always so with --reuse)
   --reuse   FOLDER is a file system from an earlier run with --keep: only silt itself is put in anew
   --tree    take the working tree (tracked and new files that are not ignored) instead of the last commit
   --only    one of the two commands instead of both
+  --package instead of the commands: installs a package of silt (cpack --config build/CPackConfig.cmake) where
+            nothing of silt's is, and runs, verifies and draws a case with water and one with grains from it
 END
 }
 
-keep=no reuse=no tree=no commands='test demo' root=
+keep=no reuse=no tree=no commands='test demo' package= root=
 while [ $# -gt 0 ]; do
     case $1 in
     --keep) keep=yes ;;
@@ -25,21 +27,27 @@ while [ $# -gt 0 ]; do
         commands=$2
         shift
         ;;
+    --package)
+        [ -r "${2:-}" ] || { usage >&2; exit 2; }
+        package=$(realpath "$2") commands=
+        shift
+        ;;
     -h | --help) usage; exit 0 ;;
     -*) usage >&2; exit 2 ;;
     *) root=$1 ;;
     esac
     shift
 done
-case $commands in 'test demo' | test | demo) ;; *) usage >&2; exit 2 ;; esac
+case $commands in 'test demo' | test | demo | '') ;; *) usage >&2; exit 2 ;; esac
 [ "$(id -u)" -eq 0 ] || { echo 'bare-debian: needs root (mount, chroot)' >&2; exit 2; }
 command -v debootstrap >/dev/null || { echo 'bare-debian: apt-get install debootstrap first' >&2; exit 2; }
 [ $reuse = no ] || [ -x "$root/bin/sh" ] || { echo 'bare-debian: --reuse needs a FOLDER from an earlier --keep' >&2; exit 2; }
 
 # an own mount namespace: whatever happens, no mount outlives this script
 if [ -z "${SILT_BARE_NAMESPACE:-}" ]; then
-    args=(--only "$commands")
-    [ "$commands" != 'test demo' ] || args=()
+    args=()
+    case $commands in test | demo) args+=(--only "$commands") ;; esac
+    [ -z "$package" ] || args+=(--package "$package")
     [ $keep = no ] || args+=(--keep)
     [ $reuse = no ] || args+=(--reuse)
     [ $tree = no ] || args+=(--tree)
@@ -189,6 +197,20 @@ in_bare_alone() {
 [ $reuse = yes ] || timed 'debootstrap' make_base
 copy_apt
 mount_all
+if [ -n "$package" ]; then
+    cp "$package" "$root/root/silt.deb"
+    in_bare dpkg --purge silt >/dev/null || true
+    in_bare apt-get -qq update
+    timed 'apt-get install ./silt.deb' in_bare apt-get -qq -y --no-install-recommends install /root/silt.deb
+    for scene in standing-wave/scene.yaml settling-grain/scene.yaml; do
+        rm -rf "$root/root/bare.out"
+        timed "silt run, $scene" in_bare silt run "/usr/share/silt/cases/$scene" -q -o /root/bare.out
+        timed "silt verify, $scene" in_bare silt verify /root/bare.out
+        timed "silt draw, $scene" in_bare silt draw /root/bare.out
+    done
+    printf '%s\n' "${report[@]}"
+    exit 0
+fi
 timed 'silt put in' copy_silt
 for command in $commands; do
     timed "bootstrap $command" in_bare "$inside/bootstrap" "$command"

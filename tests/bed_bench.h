@@ -110,6 +110,68 @@ static inline void bench_wear(bench *b, double dt) {
     silt_bed_wear(&b->bed, &b->scene, &b->nodes, &b->mesh, &b->locator, NULL, dt);
 }
 
+// ---------------------------------------------------------------- grains that lie on it
+
+enum { HEAP = 400 };
+typedef struct heap {
+    silt_grain_state state;
+    int64_t id[HEAP];
+    double x[3 * HEAP], radius[HEAP], mass[HEAP];
+    uint8_t at_rest[HEAP];
+} heap;
+
+static inline void heap_add(heap *h, const double *x, double r, double mass, bool at_rest) {
+    const int k = h->state.count++;
+    memcpy(h->x + 3 * k, x, 3 * sizeof *x);
+    h->radius[k] = r;
+    h->mass[k] = mass;
+    h->at_rest[k] = at_rest;
+    h->state.x = h->x;
+    h->state.radius = h->radius;
+    h->state.mass = h->mass;
+}
+
+// One grain after the other, all of which touch the bed or each other, becomes bed if it can: what the bed takes in it takes whole, and
+// none that stays outside ever has its centre in it. count: that became cells, of them with others, that went into pores, that wait
+static inline void heap_deposit(silt_bed *bed, const silt_scene *scene, heap *h, int count[4]) {
+    silt_bed_others others = {0};
+    bool gone[HEAP] = {0};
+    silt_bed_others_take(&others, &h->state, h->at_rest);
+    const double initial = bed->solid_mass;
+    double taken = 0;
+    for (int k = 0; k < h->state.count; k++) {
+        if (gone[k] || !h->at_rest[k])
+            continue;
+        const double before = bed->pore_water, rest_before = bed->pore_rest;
+        double sum = before, rest = rest_before;
+        silt_deposit deposit;
+        silt_bed_others_mark(&others, h->x + 3 * k, true);
+        const silt_deposit_kind kind = silt_bed_deposit(bed, scene, h->x + 3 * k, h->radius[k], h->mass[k], &others, &deposit);
+        count[kind == DEPOSIT_CELL ? 0 : kind == DEPOSIT_DENSER ? 2 : 3]++;
+        count[1] += deposit.n_other > 0;
+        gone[k] = kind != DEPOSIT_REFUSED;
+        silt_bed_others_mark(&others, h->x + 3 * k, gone[k]);
+        double whole = gone[k] ? h->mass[k] : 0;
+        for (int m = 0; m < deposit.n_other; m++) {
+            const int other = deposit.other[m];
+            assert_true(kind == DEPOSIT_CELL && h->at_rest[other] && !gone[other]);
+            whole += h->mass[other];
+            gone[other] = true;
+            silt_bed_others_mark(&others, h->x + 3 * other, true);
+        }
+        NEAR(deposit.mass, whole, 1e-14 * initial);
+        taken += whole;
+        NEAR(bed->solid_mass, initial + taken, 1e-12 * initial);
+        const double pores = kind == DEPOSIT_CELL ? deposit.area - whole / scene->bed.density : -whole / scene->bed.density;
+        silt_sum(&sum, &rest, -scene->bed.saturation * pores * scene->fluid.density);
+        NEAR(bed->pore_water, sum, 1e-12 * scene->fluid.density);
+        for (int m = 0; m < h->state.count; m++)
+            if (!gone[m] && silt_bed_contains(bed, h->x + 3 * m))
+                fail_msg("grain %d lies in the bed after that of grain %d", m, k);
+    }
+    silt_bed_others_clear(&others);
+}
+
 // ---------------------------------------------------------------- what always holds
 
 static inline double cross(const double *p, const double *q, const double *r) {

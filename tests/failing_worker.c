@@ -32,7 +32,7 @@ static int substeps(const char *why) {
 int main(int argc, char **argv) {
     int pair[2];
     const char *real = getenv("SILT_FAIL_WORKER");
-    if (argc != 3 || strcmp(argv[1], "serve") != 0 || !real || socketpair(AF_UNIX, SOCK_STREAM, 0, pair) != 0)
+    if (argc != 3 || strncmp(argv[1], "serve", 5) != 0 || !real || socketpair(AF_UNIX, SOCK_STREAM, 0, pair) != 0)
         return 2;
     char parent[32];
     snprintf(parent, sizeof parent, "%d", (int)getpid());
@@ -40,7 +40,7 @@ int main(int argc, char **argv) {
         dup2(pair[1], DEM_FD_SOCKET);
         close(pair[0]);
         close(pair[1]);
-        execl(real, real, "serve", parent, (char *)NULL);
+        execl(real, real, argv[1], parent, (char *)NULL);
         _exit(2);
     }
     close(pair[1]);

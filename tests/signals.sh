@@ -1,5 +1,5 @@
 #!/bin/sh
-# SIGUSR1: a checkpoint, and on. SIGTERM: a checkpoint and exit code 3; resume goes on to the end, with the same bits.
+# SIGUSR1: a checkpoint, and on. SIGTERM, or time.wall over: a checkpoint and exit code 3; resume goes on to the end, with the same bits.
 # usage: signals.sh SILT SCENE ROWS [option of silt run]...
 test_name=signals
 [ $# -ge 3 ] || { sed -n '3s/^# //p' "$0" >&2; exit 2; }
@@ -45,3 +45,18 @@ expect 0 "$silt" resume "$cut" -q
 grep -q "^resumed at step $((at - 1))," "$cut/run.log" || fail "the resumed run did not start at step $((at - 1))"
 same "$whole" "$cut"
 say "SIGTERM: stopped with $at rows, exit code 3, resumed: the same bits"
+
+# time.wall: each process takes the one step that it must, or goes on to where a checkpoint may be taken
+expect 0 "$silt" run "$scene" -q -o "$work/short" "$@" -D time.steps=12
+expect 3 "$silt" run "$scene" -q -o "$work/legs" "$@" -D time.steps=12 -D time.wall=1e-6
+says 'stopped since time.wall is over at t = '
+legs=1
+while [ "$code" -eq 3 ]; do
+    legs=$((legs + 1))
+    [ $legs -le 12 ] || fail "$legs processes for 12 steps"
+    code=0
+    "$silt" resume "$work/legs" -q >"$work/last.say" 2>&1 || code=$?
+done
+[ "$code" -eq 0 ] && [ $legs -gt 1 ] || fail "exit code $code after $legs processes"
+same "$work/short" "$work/legs"
+say "time.wall: 12 steps in $legs processes: the same bits"

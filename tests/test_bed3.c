@@ -484,7 +484,7 @@ static double rain(bench3 *b, uint64_t *seed, int n, double r, int count[3]) {
         for (int d = 0; d < 2; d++)
             x[d] = silt_clamp(x[d], r, (d ? 0.4 : 1) - r);
         silt_deposit deposit;
-        count[silt_bed_deposit(&b->bed, &b->scene, x, r, mass, &deposit)]++;
+        count[silt_bed_deposit(&b->bed, &b->scene, x, r, mass, NULL, &deposit)]++;
         taken += deposit.kind == DEPOSIT_REFUSED ? 0 : mass;
         NEAR(b->bed.solid_mass, initial + taken, 1e-12 * initial);
         NEAR(pores3(b) + b->bed.pore_water, water, 1e-12 * water);
@@ -521,8 +521,8 @@ static void test_deposit(void **state) {
         assert_true(volume_of(&b.bed) > volume);
         // too high, and in the bed
         silt_deposit deposit;
-        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[]){0.5, 0.2, 0.9}, 0.02, 0.01, &deposit), DEPOSIT_REFUSED);
-        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[]){0.5, 0.2, 0.1}, 0.02, 0.01, &deposit), DEPOSIT_REFUSED);
+        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[]){0.5, 0.2, 0.9}, 0.02, 0.01, NULL, &deposit), DEPOSIT_REFUSED);
+        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[]){0.5, 0.2, 0.1}, 0.02, 0.01, NULL, &deposit), DEPOSIT_REFUSED);
         // all of it away again
         double released = 0;
         while (b.bed.n_cell > 0) {
@@ -535,6 +535,27 @@ static void test_deposit(void **state) {
         NEAR(b.bed.pore_water, water, 1e-12 * water);
         close3(&b);
     }
+}
+
+// a heap of grains, four in five of them at rest
+static void test_heap(void **state) {
+    (void)state;
+    int count[4] = {0};
+    bench3 b;
+    heap h = {0};
+    uint64_t seed = 5;
+    dam3(&b, 0.1);
+    for (int k = 0; k < HEAP; k++) {
+        const double r = k % 2 ? 0.04 : 0.02;
+        double x[3] = {r + (1 - 2 * r) * silt_uniform(&seed), r + (0.4 - 2 * r) * silt_uniform(&seed), 0};
+        x[2] = silt_bed_level(&b.bed, x) + r * (1.1 + 2 * silt_uniform(&seed));
+        heap_add(&h, x, r, 2650 * 4 * M_PI / 3 * r * r * r, silt_uniform(&seed) < 0.8);
+    }
+    heap_deposit(&b.bed, &b.scene, &h, count);
+    check3(&b);
+    print_message("of the heap %d became cells, %d of them with others, %d went into pores, %d wait\n", count[0], count[1], count[2], count[3]);
+    assert_true(count[0] > 20 && count[1] > 5 && count[3] > 20);
+    close3(&b);
 }
 
 // patches go and parcels come, in turns
@@ -621,7 +642,7 @@ static void test_store(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_create),  cmocka_unit_test(test_inside),  cmocka_unit_test(test_patch), cmocka_unit_test(test_release),
-        cmocka_unit_test(test_loose), cmocka_unit_test(test_deposit), cmocka_unit_test(test_mixed), cmocka_unit_test(test_store),
+        cmocka_unit_test(test_loose), cmocka_unit_test(test_deposit), cmocka_unit_test(test_heap), cmocka_unit_test(test_mixed), cmocka_unit_test(test_store),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

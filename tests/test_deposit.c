@@ -17,7 +17,7 @@ static void drop_parcels(bench *b, int n, double lo, double hi, double r, double
         const double solid = b->bed.solid_mass, pores = b->bed.pore_water, pores_rest = b->bed.pore_rest, area = bed_area(&b->bed);
         const int64_t revision = b->bed.revision;
         silt_deposit deposit = {0};
-        count[silt_bed_deposit(&b->bed, &b->scene, at, r, mass, &deposit)]++;
+        count[silt_bed_deposit(&b->bed, &b->scene, at, r, mass, NULL, &deposit)]++;
         if (deposit.kind != DEPOSIT_REFUSED)
             taken += mass;
         NEAR(b->bed.solid_mass - solid, deposit.kind == DEPOSIT_REFUSED ? 0 : mass, 1e-13 * initial);
@@ -69,9 +69,9 @@ static void test_deposit(void **state) {
 
         // far away, or inside: refused
         silt_deposit deposit = {0};
-        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[2]){0.5, 0.95}, 0.01, mass, &deposit),
+        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[2]){0.5, 0.95}, 0.01, mass, NULL, &deposit),
                          DEPOSIT_REFUSED);
-        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[2]){0.5, 0.05}, 0.01, mass, &deposit),
+        assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[2]){0.5, 0.05}, 0.01, mass, NULL, &deposit),
                          DEPOSIT_REFUSED);
 
         // what was deposited erodes again, to the last cell
@@ -95,6 +95,65 @@ static void test_deposit(void **state) {
         NEAR(b.bed.initial_mass, initial, 0);
         bench_close(&b);
     }
+}
+
+// a parcel beside another one that its cell would hold: with it when that is at rest and there is room for both, else not as a cell
+static void test_neighbour(void **state) {
+    (void)state;
+    enum { FAR, MOVES, RESTS, HEAVY };
+    for (int kind = FAR; kind <= HEAVY; kind++) {
+        bench b;
+        bench_open(&b, 0.1);
+        bench_box(&b, 0, 0, 1, 0.2);
+        bench_wall(&b, 4, (double[]){0, 1, 0, 0, 1, 0, 1, 1});
+        bench_create(&b);
+        heap h = {0};
+        const double r = 0.03, mass = 2650 * 0.0012, at[3] = {0.55, 0.25, 0}, beside[3] = {kind == FAR ? 0.75 : 0.58, 0.21, 0};
+        heap_add(&h, at, r, mass, true);
+        heap_add(&h, beside, 0.01, kind == HEAVY ? 3 * mass : 0.1 * mass, kind != MOVES);
+        silt_bed_others others = {0};
+        silt_bed_others_take(&others, &h.state, h.at_rest);
+        silt_bed_others_mark(&others, at, true);
+        silt_deposit deposit;
+        const double before = b.bed.solid_mass;
+        const silt_deposit_kind got = silt_bed_deposit(&b.bed, &b.scene, at, r, mass, &others, &deposit);
+        assert_int_equal(got == DEPOSIT_CELL, kind == FAR || kind == RESTS);
+        assert_int_equal(silt_bed_contains(&b.bed, beside), kind == RESTS);
+        assert_int_equal(deposit.n_other, kind == RESTS);
+        if (kind == RESTS)
+            assert_int_equal(deposit.other[0], 1);
+        NEAR(b.bed.solid_mass - before, got == DEPOSIT_REFUSED ? 0 : kind == RESTS ? 1.1 * mass : mass, 1e-13 * before);
+        silt_bed_others_clear(&others);
+        bench_close(&b);
+    }
+}
+
+static void test_heap(void **state) {
+    (void)state;
+    int count[4] = {0};
+    for (int k = 0; k < 2; k++) {
+        // flat or sloping, grains of half the spacing or a fifth of it, four in five at rest
+        bench b;
+        bench_open(&b, 0.1);
+        if (k)
+            bench_polygon(&b, 4, (double[]){0, 0, 2, 0, 2, 0.2, 0, 0.8});
+        else
+            bench_box(&b, 0, 0, 2, 0.3);
+        bench_wall(&b, 4, (double[]){0, 2, 0, 0, 2, 0, 2, 2});
+        bench_create(&b);
+        heap h = {0};
+        uint64_t seed = 21;
+        for (int m = 0; m < 200; m++) {
+            const double r = m % 2 ? 0.025 : 0.01, x = 0.02 + 1.96 * silt_uniform(&seed);
+            const double at[3] = {x, silt_bed_level(&b.bed, (double[]){x}) + r * (1.1 + 3 * silt_uniform(&seed)), 0};
+            heap_add(&h, at, r, 2650 * 0.575 * 4 * r * r, silt_uniform(&seed) < 0.8);
+        }
+        heap_deposit(&b.bed, &b.scene, &h, count);
+        check_bed(&b);
+        bench_close(&b);
+    }
+    print_message("of the heap %d became cells, %d of them with others, %d went into pores, %d wait\n", count[0], count[1], count[2], count[3]);
+    assert_true(count[0] >= 20 && count[1] >= 10 && count[3] > 20);
 }
 
 static void test_deposit_erode_mixed(void **state) {
@@ -126,7 +185,7 @@ static void test_deposit_erode_mixed(void **state) {
             const double x = silt_uniform(&seed), up = 0.5 * d + 0.3 * 0.05 * silt_uniform(&seed);
             silt_deposit deposit = {0};
             const double level = silt_bed_level(&b.bed, (double[]){x});
-            if (level > 0 && silt_bed_deposit(&b.bed, &b.scene, (double[2]){x, level + up}, 0.5 * d, parcel, &deposit))
+            if (level > 0 && silt_bed_deposit(&b.bed, &b.scene, (double[2]){x, level + up}, 0.5 * d, parcel, NULL, &deposit))
                 outside -= parcel;
             count[deposit.kind]++;
         }
@@ -179,7 +238,7 @@ static void bench_step(bench *b, uint64_t *seed) {
     const double x = silt_uniform(seed), level = silt_bed_level(&b->bed, (double[]){x});
     silt_deposit deposit = {0};
     if (level > 0)
-        silt_bed_deposit(&b->bed, &b->scene, (double[2]){x, level + 0.02}, 0.0075, 0.3, &deposit);
+        silt_bed_deposit(&b->bed, &b->scene, (double[2]){x, level + 0.02}, 0.0075, 0.3, NULL, &deposit);
 }
 
 static void test_save_load(void **state) {
@@ -239,6 +298,8 @@ static void test_save_load(void **state) {
 int main(void) {
     const struct CMUnitTest test[] = {
         cmocka_unit_test(test_deposit),
+        cmocka_unit_test(test_neighbour),
+        cmocka_unit_test(test_heap),
         cmocka_unit_test(test_deposit_erode_mixed),
         cmocka_unit_test(test_save_load),
     };

@@ -7,8 +7,9 @@
 
 #include <cmocka.h>
 
-// the loop's own functions
-#include "../pfem/run/run.c"
+#include "run.h"
+
+#include <unistd.h>
 
 #include <dirent.h>
 #include <sys/stat.h>
@@ -45,14 +46,11 @@ static void bench_start(bench *b, const char *path, int n_set, const char *const
     free(full);
     snprintf(b->folder, sizeof b->folder, "%s/tests/exact-XXXXXX", SILT_BINARY);
     assert_non_null(mkdtemp(b->folder));
-    run_begin(&b->run, b->scene, &def, b->folder, -1, NULL);
-    OK(run_start(&b->run, &error));
+    OK(silt_run_open(&b->run, b->scene, &def, b->folder, -1, &error));
 }
 
 static void bench_step(bench *b) {
-    OK(run_step(&b->run, &error));
-    OK(step_close(&b->run, &error));
-    OK(step_output(&b->run, &error));
+    OK(silt_run_advance(&b->run, &error));
     b->fastest = silt_max(b->fastest, b->run.ledger.max_speed);
 }
 

@@ -7,8 +7,9 @@
 
 #include <cmocka.h>
 
-// the loop's own functions
-#include "../pfem/run/run.c"
+#include "run.h"
+
+#include <unistd.h>
 
 #include <dirent.h>
 #include <sys/stat.h>
@@ -50,7 +51,7 @@ static void begin(silt_run *run, silt_scene **scene, const cloud *c, const char 
     mkdir(out, 0700);
     if (silt_scene_read(yaml, 0, NULL, scene, &err) != SILT_OK)
         fail_msg("%s", err.text);
-    if (run_begin(run, *scene, &def, out, -1, &err) != SILT_OK || run_start(run, &err) != SILT_OK)
+    if (silt_run_open(run, *scene, &def, out, -1, &err) != SILT_OK)
         fail_msg("%s", err.text);
     free(yaml);
     free(csv);
@@ -78,7 +79,7 @@ static void end(silt_run *run, silt_scene **scene) {
 static void go(silt_run *run, double until) {
     silt_error err = {0};
     while (run->time < until - 1e-9)
-        if (run_step(run, &err) != SILT_OK || step_close(run, &err) != SILT_OK || step_output(run, &err) != SILT_OK)
+        if (silt_run_advance(run, &err) != SILT_OK)
             fail_msg("t = %g: %s", run->time, err.text);
 }
 

@@ -389,7 +389,7 @@ static void test_deposited(void **state) {
     // a parcel that leaves a cell looser than the bed: its new node has the deposit's work
     silt_deposit deposit;
     const double mass = 0.4 * 2650 * 0.05 * 0.03 / 2, whole = b.bed.solid_mass;
-    assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[]){0.275, 0.13, 0}, 0.02, mass, &deposit), DEPOSIT_CELL);
+    assert_int_equal(silt_bed_deposit(&b.bed, &b.scene, (double[]){0.275, 0.13, 0}, 0.02, mass, NULL, &deposit), DEPOSIT_CELL);
     assert_true(deposit.node >= b.bed.n_first);
     for (int i = 0; i < b.bed.n_node; i++)
         NEAR(silt_bed_work(&b.bed, &b.scene, i), i == deposit.node ? 10 : 100, 0);
@@ -454,7 +454,7 @@ static void test_ledger(void **state) {
             for (int d = 0; d < 2; d++)
                 x[d] = 0.5 * (b.bed.x[edge[0]][d] + b.bed.x[edge[1]][d]) + 0.03 * out[d] / hypot(out[0], out[1]);
             silt_deposit deposit;
-            if (silt_bed_deposit(&b.bed, &b.scene, x, 0.03, grain[n - 1], &deposit) != DEPOSIT_REFUSED) {
+            if (silt_bed_deposit(&b.bed, &b.scene, x, 0.03, grain[n - 1], NULL, &deposit) != DEPOSIT_REFUSED) {
                 silt_sum(&deposited, &deposited_rest, grain[--n]);
                 n_deposit++;
             } else if (silt_random(&random) % 200 == 0) {

@@ -26,7 +26,7 @@ static double grain_radius[] = {0.1, 0.05};
 
 static double outline[] = {-0.2, -0.1, 0.2, -0.1, 0.2, 0.1, -0.2, 0.1};
 // turned by a right angle
-static struct silt_body block = {.x = {1.5, 0.5, 0}, .v = {1, 0, 0}, .w = {0, 0, 2}, .n_point = 4, .outline = outline};
+static struct silt_body block = {.x = {1.5, 0.5, 0}, .v = {1, 0, 0}, .w = {0, 0, 2}, .n_point = 4, .point = outline};
 
 typedef struct world {
     silt_scene scene;
@@ -499,7 +499,7 @@ static void test_draw(void **state) {
     mkdir(place("draw"), 0777);
     make("draw/scene.yaml", SCENE);
     make("draw/curve.csv", "t,x\n1,1\n2,4\n");
-    assert_int_equal(silt_draw(place("draw"), -2, NULL, NULL, NULL, NULL, &err), SILT_FAILED);
+    assert_int_equal(silt_draw(place("draw"), &(silt_draw_def){0}, NULL, &err), SILT_FAILED);
     contains(err.text, "has no frames");
     for (int i = 0; i < 2; i++) {
         w.view.time = i;
@@ -507,18 +507,18 @@ static void test_draw(void **state) {
     }
     for (int i = 0; i < 7; i++) {
         unlink(place("draw/picture_000001.png"));
-        if (silt_draw(place("draw"), -2, field[i], NULL, NULL, NULL, &err))
+        if (silt_draw(place("draw"), &(silt_draw_def){.field = field[i]}, NULL, &err))
             fail_msg("%s", err.text);
         assert_false(exists("draw/picture_000000.png"));
         assert_int_equal(stat(place("draw/picture_000001.png"), &file), 0);
         assert_true(file.st_size > 4000);
     }
     assert_memory_equal(content("draw/picture_000001.png"), "\x89PNG", 4);
-    assert_int_equal(silt_draw(place("draw"), -1, "mesh", NULL, NULL, NULL, &err), SILT_OK);
+    assert_int_equal(silt_draw(place("draw"), &(silt_draw_def){.frames = DRAW_ALL, .field = "mesh"}, NULL, &err), SILT_OK);
     assert_true(exists("draw/picture_000000.png"));
-    assert_int_equal(silt_draw(place("draw"), 7, NULL, NULL, NULL, NULL, &err), SILT_INPUT);
+    assert_int_equal(silt_draw(place("draw"), &(silt_draw_def){.frames = DRAW_ONE, .frame = 7}, NULL, &err), SILT_INPUT);
     contains(err.text, "has no frame 7; its frames are 0 to 1");
-    assert_int_equal(silt_draw(place("draw"), 0, "colour", NULL, NULL, NULL, &err), SILT_INPUT);
+    assert_int_equal(silt_draw(place("draw"), &(silt_draw_def){.frames = DRAW_ONE, .field = "colour"}, NULL, &err), SILT_INPUT);
     contains(err.text, "field colour is not known: mesh, pressure, speed, elevation, vorticity, porosity or bed");
     silt_locator_clear(&w.locator);
 }

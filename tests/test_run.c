@@ -7,8 +7,9 @@
 
 #include <cmocka.h>
 
-// the loop's own functions
-#include "../pfem/run/run.c"
+#include "run.h"
+
+#include <unistd.h>
 
 #include <dirent.h>
 #include <sys/stat.h>
@@ -25,8 +26,7 @@ static void begin(silt_run *run, silt_scene **scene, const char *path, int n_set
         fail_msg("%s", err.text);
     snprintf(folder, sizeof folder, "%s/tests/run-XXXXXX", SILT_BINARY);
     assert_non_null(mkdtemp(folder));
-    run_begin(run, *scene, &def, folder, -1, NULL);
-    if (run_start(run, &err) != SILT_OK)
+    if (silt_run_open(run, *scene, &def, folder, -1, &err) != SILT_OK)
         fail_msg("%s", err.text);
 }
 
@@ -44,7 +44,7 @@ static void end(silt_run *run, silt_scene **scene) {
 static void steps(silt_run *run, int n) {
     silt_error err = {0};
     for (int k = 0; k < n; k++)
-        if (run_step(run, &err) != SILT_OK || step_close(run, &err) != SILT_OK || step_output(run, &err) != SILT_OK)
+        if (silt_run_advance(run, &err) != SILT_OK)
             fail_msg("step %d: %s", k, err.text);
 }
 
@@ -76,7 +76,7 @@ static void test_water_alone(void **state) {
     assert_null(run.grown);
     assert_null(run.body_before);
     silt_view view;
-    run_view(&run, &view);
+    silt_run_view(&run, &view);
     assert_null(view.bed);
     assert_null(view.grains);
     assert_null(view.bodies);
@@ -172,7 +172,7 @@ static void fails_and_leaves(const char *path, int n_set, const char *const *set
     const bits whole = take_bits(&run);
     for (int k = 0; k < 2; k++) {
         err = (silt_error){0};
-        assert_int_equal(run_step(&run, &err), SILT_FAILED);
+        assert_int_equal(silt_run_advance(&run, &err), SILT_FAILED);
         assert_true(run.whole);
         assert_non_null(strstr(err.text, "gave up after"));
         assert_non_null(strstr(err.text, thrown ? "would throw body '" : "continuity did not converge: a node at ("));

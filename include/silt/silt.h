@@ -1,7 +1,8 @@
 /** @file silt.h
- * The product's C API: read a scene, run it, resume it, hold the result against its checks.
- * A function that can fail returns a silt_status and fills a silt_error; nothing here exits. A run prints a progress line on
- * stderr unless it is quiet, and takes SIGTERM and SIGUSR1 while it lasts. Exhausted memory alone ends the program.
+ * The product's C API: read a scene, run it or step through it, resume it, hold the result against its checks.
+ * A function that can fail returns a silt_status and fills a silt_error (which may be NULL); nothing here exits. silt_scene_run and
+ * silt_run_resume print a progress line on stderr unless quiet, and take SIGTERM and SIGUSR1 while they last. Exhausted memory alone
+ * ends the program. Several runs may be open at once in a process, each in a folder of its own; call them from one thread at a time.
  */
 #ifndef SILT_SILT_H
 #define SILT_SILT_H
@@ -9,6 +10,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -16,6 +18,8 @@ extern "C" {
 
 #define SILT_API __attribute__((visibility("default")))
 #define SILT_VERSION "0.1.0"
+
+SILT_API const char *silt_version(void); /**< of the library, SILT_VERSION is that of this header */
 
 /** What became of a call. The command line maps these to exit codes: OK 0, FAILED 1, INPUT 2, STOPPED 3. */
 typedef enum silt_status {
@@ -58,6 +62,54 @@ typedef struct silt_run_def {
 SILT_API silt_status silt_scene_run(const silt_scene *scene, const silt_run_def *def, silt_error *err);
 /** Goes on from the newest whole checkpoint in def->out. */
 SILT_API silt_status silt_run_resume(const silt_run_def *def, silt_error *err);
+/** Holds a folder of results against the checks of its scene; prints a line a check to `to`. SILT_FAILED when one fails. */
+SILT_API silt_status silt_verify(const char *out, FILE *to, silt_error *err);
+
+/* ---- step by step: start or take_up, advance until ended, finish ---- */
+
+/** Makes the output folder and the state at t = 0 with its row and frame.
+ * @param run    out, owned by the caller until silt_run_finish; NULL when it failed
+ * @param scene  borrowed, until silt_run_finish */
+SILT_API silt_status silt_run_start(silt_run **run, const silt_scene *scene, const silt_run_def *def, silt_error *err);
+/** The same from the newest whole checkpoint in def->out. */
+SILT_API silt_status silt_run_take_up(silt_run **run, const silt_run_def *def, silt_error *err);
+/** One step, with its row and, if it is due, its frame; also past the scene's end. After a failure only silt_run_finish may follow. */
+SILT_API silt_status silt_run_advance(silt_run *run, silt_error *err);
+SILT_API bool silt_run_ended(const silt_run *run); /**< true at the scene's (or def->until's) end */
+/** Writes a checkpoint of the present state. With grains or bodies: a run that goes on from it does so to the same bits only where
+ * silt_scene_run would have written one, at the end of a frame. */
+SILT_API silt_status silt_run_checkpoint(silt_run *run, silt_error *err);
+/** Writes the summary, closes, frees and sets NULL. @param status  what the last call gave: it is told in the summary, and a
+ * failed run leaves a checkpoint of its last whole step. @return status, or what closing itself met */
+SILT_API silt_status silt_run_finish(silt_run **run, silt_status status, silt_error *err);
+
+/** What a run holds at this moment. All arrays are borrowed until the next call with the run; SI units; in 2-D cell[][3] is -1. */
+typedef struct silt_fields {
+    int dim;
+    int64_t step;
+    double time, dt;       /**< s, now; of the last step */
+    int n_node;            /**< 0 without water */
+    const double *x, *v;   /**< dim per node, m and m/s */
+    const double *p;       /**< per node, Pa */
+    int n_cell;
+    const int (*cell)[4];  /**< nodes of each triangle or tetrahedron of water */
+    int n_grain;
+    const int64_t *grain_id;
+    const double *grain_x, *grain_v; /**< 3 per grain */
+    const double *grain_radius;      /**< m */
+    int n_body;                      /**< see silt_run_body */
+} silt_fields;
+SILT_API void silt_run_fields(silt_run *run, silt_fields *fields);
+
+/** where a rigid body is and how it moves */
+typedef struct silt_pose {
+    double x[3], v[3]; /**< centroid, m; m/s */
+    double q[4], w[3]; /**< orientation w, x, y, z; rad/s */
+} silt_pose;
+/** @return false where the scene has no body of that name */
+SILT_API bool silt_run_body(silt_run *run, const char *name, silt_pose *pose);
+/** The present value of any column of history.csv, gauges and forces on bodies among them; NaN where there is none of that name. */
+SILT_API double silt_run_value(silt_run *run, const char *column);
 
 #ifdef __cplusplus
 }

@@ -20,7 +20,7 @@ typedef struct silt_patch {
     int cell[PATCH_CELLS]; // bed cells
 } silt_patch;
 
-enum { DEPOSIT_CELLS = 32 };
+enum { DEPOSIT_CELLS = 32, DEPOSIT_OTHERS = 32 };
 
 typedef enum {
     DEPOSIT_REFUSED = 0, // too far from the bed, or no sound place
@@ -32,6 +32,9 @@ typedef struct silt_deposit {
     int node;          // the new bed node, or -1
     int n_cell;
     int cell[DEPOSIT_CELLS]; // the new cells
+    int n_other;
+    int other[DEPOSIT_OTHERS]; // grains that became bed with the parcel
+    double mass;       // kg/m, theirs and the parcel's
     double area;       // m2, in space m3, of the new cells
     double pore_water; // kg/m, water taken out of the flow by the new pores (negative: displaced out of pores)
 } silt_deposit;
@@ -55,11 +58,31 @@ void silt_bed_release(silt_bed *bed, const silt_scene *scene, const silt_patch *
  * the bed by nodes at most. Releasing them all (each patch asked for anew) may need another call when the piece has cells
  * inside. @return how many (at most capacity) */
 int silt_bed_loose(const silt_bed *bed, const silt_scene *scene, int capacity, int *node);
+/** a grain beside the parcel that becomes bed */
+typedef struct silt_bed_other {
+    double x[3], radius, mass; // kg/m
+    int grain;    // index in the state
+    bool at_rest; // it may become bed with the parcel
+    bool bed;     // it has become bed, or is the parcel itself
+} silt_bed_other;
+typedef struct silt_bed_others {
+    int count;
+    silt_bed_other *grain; // owned, by rising x[0]
+    double largest;        // m, radius
+} silt_bed_others;
+/** @param at_rest  one per grain */
+void silt_bed_others_take(silt_bed_others *others, const silt_grain_state *grains, const uint8_t *at_rest);
+/** whether the grain at x counts as bed from here on */
+void silt_bed_others_mark(silt_bed_others *others, const double *x, bool bed);
+void silt_bed_others_clear(silt_bed_others *others);
 /** Puts a parcel's solid mass (kg/m) at x (radius r) back on the bed. The new node is at x; up to r higher where that would
- * leave the mass too little room; on a wall that is nearer than half a spacing and where the surface ends. deposit->cell
- * holds until the next change. @return also in deposit->kind */
+ * leave the mass too little room; on a wall that is nearer than half a spacing and where the surface ends. Grains that new
+ * cells hold, or come nearer to than half their radius, become bed with it if they are at rest and the cells have room for their mass;
+ * if not there is no such cell. deposit->cell holds until the next change.
+ * @param others  NULL: none
+ * @return also in deposit->kind */
 silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass,
-                                   silt_deposit *deposit);
+                                   const silt_bed_others *others, silt_deposit *deposit);
 bool silt_bed_contains(const silt_bed *bed, const double *x);
 /** true when an exposed node lies nearer than reach */
 bool silt_bed_near(const silt_bed *bed, const double *x, double reach);

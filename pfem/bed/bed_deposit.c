@@ -10,6 +10,7 @@ typedef struct bed_growth {
     double x[2];
     int n, node[CHAIN];
     double area;
+    bed_taking taking;
 } bed_growth;
 
 // angle swept counter-clockwise from at -> p to at -> q, 0 to 2 pi
@@ -150,7 +151,7 @@ static bool growth_clear(const silt_bed *bed, const silt_scene *scene, const bed
 // Would the bed grow soundly by cells between the edge and x, with a porosity between 0.2 and 0.8? Where the parcel's
 // centre leaves it too little room the new node goes up to the parcel's top.
 static bool growth_try(const silt_bed *bed, const silt_scene *scene, int edge, const double x[2], double lift,
-                       double mass, bed_growth *growth) {
+                       double mass, const silt_bed_others *others, bed_growth *growth) {
     const double size = bed_size(scene);
     const double *p = bed->x[bed->edge[edge][0]], *q = bed->x[bed->edge[edge][1]], length = bed_distance(p, q);
     *growth = (bed_growth){.n = 2, .node = {bed->edge[edge][0], bed->edge[edge][1]}};
@@ -161,9 +162,13 @@ static bool growth_try(const silt_bed *bed, const silt_scene *scene, int edge, c
         !growth_fill(bed, size, growth, true) || !growth_fill(bed, size, growth, false) ||
         !growth_clear(bed, scene, growth))
         return false;
-    for (int k = 0; k + 1 < growth->n; k++)
-        growth->area += 0.5 * bed_cross(bed->x[growth->node[k]], bed->x[growth->node[k + 1]], growth->x);
-    const double porosity = 1 - mass / scene->bed.density / growth->area;
+    for (int k = 0; k + 1 < growth->n; k++) {
+        const double *const corner[4] = {bed->x[growth->node[k]], bed->x[growth->node[k + 1]], growth->x};
+        growth->area += 0.5 * bed_cross(corner[0], corner[1], corner[2]);
+        if (!silt_bed_others_in(2, corner, others, &growth->taking))
+            return false;
+    }
+    const double porosity = 1 - (mass + growth->taking.mass) / scene->bed.density / growth->area;
     return porosity >= 0.2 && porosity <= 0.8;
 }
 
@@ -191,7 +196,8 @@ static void growth_commit(silt_bed *bed, const silt_scene *scene, const bed_grow
 }
 
 // The edge nearest to x with x on the water's side, and cells over it. @return the edge, -1: none within reach
-static int deposit_plane(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass, silt_deposit *deposit) {
+static int deposit_plane(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass, const silt_bed_others *others,
+                         silt_deposit *deposit) {
     // at a convex node two edges are equally near
     const double reach = r + 0.35 * bed_size(scene), tie = 0.01 * bed_size(scene);
     double nearest = reach;
@@ -214,8 +220,9 @@ static int deposit_plane(silt_bed *bed, const silt_scene *scene, const double *x
                 bed_segment_distance(p, q, x) > silt_min(nearest + tie, reach))
                 continue;
             for (int lift = 0; lift <= 4; lift++)
-                if (growth_try(bed, scene, e, x, 0.25 * lift * r, mass, &growth)) {
-                    growth_commit(bed, scene, &growth, mass, deposit);
+                if (growth_try(bed, scene, e, x, 0.25 * lift * r, mass, others, &growth)) {
+                    silt_bed_others_tell(others, &growth.taking, mass, deposit);
+                    growth_commit(bed, scene, &growth, deposit->mass, deposit);
                     return below;
                 }
         }
@@ -223,7 +230,8 @@ static int deposit_plane(silt_bed *bed, const silt_scene *scene, const double *x
 }
 
 // the same with faces; where few of them leave the mass too little room, the notches beside the new cells are filled up
-static int deposit_space(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass, silt_deposit *deposit) {
+static int deposit_space(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass, const silt_bed_others *others,
+                         silt_deposit *deposit) {
     static const double notch[] = {100, 140, 170};
     double distance;
     const int below = silt_bed_face_below(bed, x, r + 0.35 * bed_size(scene), &distance);
@@ -232,8 +240,9 @@ static int deposit_space(silt_bed *bed, const silt_scene *scene, const double *x
     bed_growth3 growth;
     for (int width = 0; width < 3; width++)
         for (int lift = 0; lift <= 4; lift++)
-            if (silt_bed_grow_try(bed, scene, below, x, 0.25 * lift * r, notch[width] * M_PI / 180, mass, &growth)) {
-                silt_bed_grow(bed, scene, &growth, mass, deposit);
+            if (silt_bed_grow_try(bed, scene, below, x, 0.25 * lift * r, notch[width] * M_PI / 180, mass, others, &growth)) {
+                silt_bed_others_tell(others, &growth.taking, mass, deposit);
+                silt_bed_grow(bed, scene, &growth, deposit->mass, deposit);
                 deposit->area = growth.volume;
                 return below;
             }
@@ -241,16 +250,16 @@ static int deposit_space(silt_bed *bed, const silt_scene *scene, const double *x
 }
 
 silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const double *x, double r, double mass,
-                                   silt_deposit *deposit) {
+                                   const silt_bed_others *others, silt_deposit *deposit) {
     *deposit = (silt_deposit){.kind = DEPOSIT_REFUSED, .node = -1};
     if (!(mass > 0) || bed->n_edge == 0)
         return deposit->kind;
-    const int below = (bed_dim(bed) == 3 ? deposit_space : deposit_plane)(bed, scene, x, r, mass, deposit);
+    const int below = (bed_dim(bed) == 3 ? deposit_space : deposit_plane)(bed, scene, x, r, mass, others, deposit);
     if (below < 0)
         return deposit->kind;
     if (deposit->n_cell > 0) {
         deposit->kind = DEPOSIT_CELL;
-        deposit->pore_water = scene->bed.saturation * (deposit->area - mass / scene->bed.density) * scene->fluid.density;
+        deposit->pore_water = scene->bed.saturation * (deposit->area - deposit->mass / scene->bed.density) * scene->fluid.density;
         silt_sum(&bed->pore_water, &bed->pore_rest, -deposit->pore_water);
         return deposit->kind;
     }
@@ -259,7 +268,7 @@ silt_deposit_kind silt_bed_deposit(silt_bed *bed, const silt_scene *scene, const
     const int cell = silt_bed_cell_at(bed, bed->edge[below]);
     if (1 - (bed->mass[cell] + mass) / scene->bed.density / bed->area[cell] < 0.2)
         return deposit->kind;
-    bed->mass[cell] += mass;
+    bed->mass[cell] += deposit->mass = mass;
     silt_bed_refresh(bed);
     deposit->kind = DEPOSIT_DENSER;
     deposit->pore_water = -scene->bed.saturation * mass / scene->bed.density * scene->fluid.density;

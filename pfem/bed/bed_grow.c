@@ -206,7 +206,7 @@ static bool growth_clear(const silt_bed *bed, double size, const bed_growth3 *gr
 }
 
 bool silt_bed_grow_try(const silt_bed *bed, const silt_scene *scene, int face, const double *x, double lift, double notch, double mass,
-                       bed_growth3 *growth) {
+                       const silt_bed_others *others, bed_growth3 *growth) {
     const double size = bed_size(scene);
     double normal[3];
     *growth = (bed_growth3){.n = 1, .face = {face}};
@@ -219,9 +219,12 @@ bool silt_bed_grow_try(const silt_bed *bed, const silt_scene *scene, int face, c
         return false;
     for (int k = 0; k < growth->n; k++) {
         const int *own = bed->edge[growth->face[k]];
-        growth->volume += bed_volume6(bed->x[own[0]], bed->x[own[1]], bed->x[own[2]], growth->x) / 6;
+        const double *const corner[4] = {bed->x[own[0]], bed->x[own[1]], bed->x[own[2]], growth->x};
+        growth->volume += bed_volume6(corner[0], corner[1], corner[2], corner[3]) / 6;
+        if (!silt_bed_others_in(3, corner, others, &growth->taking))
+            return false;
     }
-    const double porosity = 1 - mass / scene->bed.density / growth->volume;
+    const double porosity = 1 - (mass + growth->taking.mass) / scene->bed.density / growth->volume;
     return porosity >= 0.2 && porosity <= 0.8 && growth_clear(bed, size, growth);
 }
 

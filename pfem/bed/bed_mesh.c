@@ -449,8 +449,7 @@ bool silt_bed_near(const silt_bed *bed, const double *x, double reach) {
     return false;
 }
 
-// distance of x from the triangle p, q, r
-static double triangle_distance(const double *p, const double *q, const double *r, const double *x) {
+double silt_bed_triangle_distance(const double *p, const double *q, const double *r, const double *x) {
     const double *corner[3] = {p, q, r};
     double u[3], v[3], w[3], square = HUGE_VAL;
     for (int d = 0; d < 3; d++) {
@@ -484,7 +483,7 @@ static double triangle_distance(const double *p, const double *q, const double *
 
 double silt_bed_facet_distance(const silt_bed *bed, const int facet[3], const double *x) {
     const double *p = bed->x[facet[0]], *q = bed->x[facet[1]];
-    return bed_dim(bed) == 3 ? triangle_distance(p, q, bed->x[facet[2]], x) : bed_segment_distance(p, q, x);
+    return bed_dim(bed) == 3 ? silt_bed_triangle_distance(p, q, bed->x[facet[2]], x) : bed_segment_distance(p, q, x);
 }
 
 static double edge_level(const double *p, const double *q, double x) {

@@ -91,6 +91,19 @@ static inline double bed_segment_distance(const double p[2], const double q[2], 
     return hypot(x[0] - p[0] - s * dx, x[1] - p[1] - s * dy);
 }
 
+/** what a new cell would take in besides the parcel */
+typedef struct bed_taking {
+    int n, other[DEPOSIT_OTHERS]; // in silt_bed_others
+    double mass;                  // kg/m, of these
+} bed_taking;
+/** Adds the grains that a new cell with these corners (dim numbers each, positive volume) holds or comes too near to; see silt_bed_deposit.
+ * @return false when one of them is not at rest, or they are too many */
+bool silt_bed_others_in(int dim, const double *const corner[4], const silt_bed_others *others, bed_taking *taking);
+/** tells the deposit of them */
+void silt_bed_others_tell(const silt_bed_others *others, const bed_taking *taking, double mass, silt_deposit *deposit);
+/** distance of x from the triangle p, q, r */
+double silt_bed_triangle_distance(const double *p, const double *q, const double *r, const double *x);
+
 /** the scene's spacing of the bed's nodes and of the water's */
 static inline double bed_size(const silt_scene *scene) {
     return scene->bed.size > 0 ? scene->bed.size : scene->fluid.size;

@@ -26,10 +26,7 @@ static const silt_draw_field draw_fields[] = {
 
 // ---------------------------------------------------------------- a picture
 
-static silt_status draw_picture(silt_draw_canvas *c, const silt_frame_entry *entry, const char *to, FILE *say,
-                                silt_error *err) {
-    char *path = silt_text("%s/picture_%06d.png", to, entry->number), *aside = silt_text("%s.part", path);
-    silt_status status = SILT_OK;
+cairo_surface_t *silt_draw_picture(silt_draw_canvas *c, const silt_frame_entry *entry) {
     int width = MARGIN_LEFT + c->width + c->right, height = MARGIN_TOP + c->height + MARGIN_BOTTOM;
     c->surface = cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height);
     c->cr = cairo_create(c->surface);
@@ -55,9 +52,17 @@ static silt_status draw_picture(silt_draw_canvas *c, const silt_frame_entry *ent
         silt_draw_text(c->cr, MARGIN_LEFT, 32, -1, 18, true, c->scene->title);
     }
     cairo_destroy(c->cr);
+    c->cr = NULL;
+    return c->surface;
+}
+
+static silt_status draw_file(silt_draw_canvas *c, const silt_frame_entry *entry, const char *to, FILE *say, silt_error *err) {
+    char *path = silt_text("%s/picture_%06d.png", to, entry->number), *aside = silt_text("%s.part", path);
+    silt_status status = SILT_OK;
+    cairo_surface_t *surface = silt_draw_picture(c, entry);
     errno = 0;
-    cairo_status_t written = cairo_surface_write_to_png(c->surface, aside);
-    cairo_surface_destroy(c->surface);
+    cairo_status_t written = cairo_surface_write_to_png(surface, aside);
+    cairo_surface_destroy(surface);
     if (written != CAIRO_STATUS_SUCCESS || rename(aside, path) != 0)
         status = silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", path,
                            written ? cairo_status_to_string(written) : strerror(errno));
@@ -68,6 +73,8 @@ static silt_status draw_picture(silt_draw_canvas *c, const silt_frame_entry *ent
     return status;
 }
 
+// ---------------------------------------------------------------- what is asked for
+
 // "y=0.5"
 static bool draw_plane(const char *text, silt_draw_canvas *c) {
     char *end = NULL;
@@ -76,61 +83,90 @@ static bool draw_plane(const char *text, silt_draw_canvas *c) {
     return c->slice && end > text + 2 && *end == 0 && isfinite(c->slice_at);
 }
 
-silt_status silt_draw(const char *out, int frame, const char *field, const char *slice, const char *to, FILE *say,
-                      silt_error *err) {
-    enum { N_FIELD = sizeof draw_fields / sizeof draw_fields[0] };
-    silt_draw_canvas canvas = {.out = out};
-    silt_frame_entry *entry = NULL;
-    silt_scene *scene = NULL;
-    silt_walls walls = {0};
-    silt_status status = SILT_OK;
-    int n, drawn = 0;
-    for (int i = 0; i < N_FIELD; i++)
-        if (!field || strcmp(field, draw_fields[i].name) == 0) {
-            canvas.field = &draw_fields[i];
-            break;
-        }
-    if (!canvas.field)
-        return silt_fail(err, SILT_INPUT,
-                         "field %s is not known: mesh, pressure, speed, elevation, vorticity, porosity or bed", field);
-    if (slice && !draw_plane(slice, &canvas))
-        return silt_fail(err, SILT_INPUT, "slice %s is no plane: for example y=0.5", slice);
+// "water,grains"
+static bool draw_without(const char *text, silt_draw_canvas *c) {
+    static const char *const part[] = {"water", "bed", "grains", "bodies", "walls"};
+    enum { N_PART = sizeof part / sizeof *part };
+    for (size_t n; *text; text += n + (text[n] == ',')) {
+        int k = 0;
+        for (n = strcspn(text, ","); k < N_PART && (strlen(part[k]) != n || strncmp(part[k], text, n) != 0);)
+            k++;
+        if (k == N_PART)
+            return false;
+        c->without |= 1u << k;
+    }
+    return c->without != 0;
+}
 
+static silt_status draw_asked(silt_draw_canvas *c, const silt_draw_def *def, silt_error *err) {
+    enum { N_FIELD = sizeof draw_fields / sizeof draw_fields[0] };
+    for (int i = 0; i < N_FIELD && !c->field; i++)
+        if (!def->field || strcmp(def->field, draw_fields[i].name) == 0)
+            c->field = &draw_fields[i];
+    if (!c->field)
+        return silt_fail(err, SILT_INPUT,
+                         "field %s is not known: mesh, pressure, speed, elevation, vorticity, porosity or bed", def->field);
+    if (def->slice && !draw_plane(def->slice, c))
+        return silt_fail(err, SILT_INPUT, "slice %s is no plane: for example y=0.5", def->slice);
+    if (def->without && !draw_without(def->without, c))
+        return silt_fail(err, SILT_INPUT, "without %s: water, bed, grains, bodies, walls or several with commas between", def->without);
+    return SILT_OK;
+}
+
+silt_status silt_draw_open(silt_draw_canvas *c, silt_draw_book *book, const char *out, const silt_draw_def *def, silt_error *err) {
+    *c = (silt_draw_canvas){.out = out};
+    memset(book, 0, sizeof *book);
+    SILT_TRY(draw_asked(c, def, err));
+    book->n_frame = silt_frame_index(out, &book->entry);
+    if (book->n_frame == 0)
+        return silt_fail(err, SILT_FAILED, "%s: has no frames", out);
     char *path = silt_text("%s/scene.yaml", out);
-    n = silt_frame_index(out, &entry);
-    if (n == 0) {
-        status = silt_fail(err, SILT_FAILED, "%s: has no frames", out);
-        goto done;
-    }
-    status = silt_scene_read(path, 0, NULL, &scene, err);
+    silt_status status = silt_scene_read(path, 0, NULL, &book->scene, err);
+    free(path);
     if (status)
-        goto done;
-    canvas.scene = scene;
-    if ((canvas.slice && scene->dimension != 3) || (canvas.field->made == MADE_VORTICITY && scene->dimension == 3)) {
-        status = silt_fail(err, SILT_INPUT, "%s: %s", out,
-                           canvas.slice ? "a slice is for three dimensions" : "vorticity is drawn in two dimensions");
-        goto done;
-    }
+        return status;
+    c->scene = book->scene;
+    if ((c->slice && c->scene->dimension != 3) || (c->field->made == MADE_VORTICITY && c->scene->dimension == 3))
+        return silt_fail(err, SILT_INPUT, "%s: %s", out,
+                         c->slice ? "a slice is for three dimensions" : "vorticity is drawn in two dimensions");
     // the run had them: a surface file that is gone since is no reason not to draw
-    if (silt_walls_create(&walls, scene, NULL) == SILT_OK)
-        canvas.walls = &walls;
-    if (scene->dimension == 3 && !canvas.slice)
-        silt_draw_space_survey(&canvas, entry, n);
+    if (silt_draw_shows(c, DRAW_WALLS) && silt_walls_create(&book->walls, book->scene, NULL) == SILT_OK)
+        c->walls = &book->walls;
+    if (c->scene->dimension == 3 && !c->slice)
+        silt_draw_space_survey(c, book->entry, book->n_frame);
     else
-        silt_draw_flat_survey(&canvas, entry, n);
-    for (int i = 0; i < n && !status; i++) {
-        if (frame == -1 || (frame == -2 ? i == n - 1 : entry[i].number == frame)) {
-            status = draw_picture(&canvas, &entry[i], to ? to : out, say, err);
+        silt_draw_flat_survey(c, book->entry, book->n_frame);
+    return SILT_OK;
+}
+
+void silt_draw_close(silt_draw_book *book) {
+    silt_walls_clear(&book->walls);
+    silt_scene_free(&book->scene);
+    free(book->entry);
+    memset(book, 0, sizeof *book);
+}
+
+silt_status silt_draw(const char *out, const silt_draw_def *def, FILE *say, silt_error *err) {
+    silt_draw_canvas canvas;
+    silt_draw_book book;
+    int drawn = 0;
+    silt_status status = silt_draw_open(&canvas, &book, out, def, err);
+    const int n = book.n_frame;
+    if (!status && def->film) {
+        status = silt_draw_film(&canvas, &book, def->film, err);
+        if (!status && say)
+            fprintf(say, "%s\n", def->film);
+        drawn = n;
+    }
+    for (int i = 0; i < n && !status && !def->film; i++) {
+        if (def->frames == DRAW_ALL || (def->frames == DRAW_LAST ? i == n - 1 : book.entry[i].number == def->frame)) {
+            status = draw_file(&canvas, &book.entry[i], def->to ? def->to : out, say, err);
             drawn++;
         }
     }
     if (!status && drawn == 0)
-        status = silt_fail(err, SILT_INPUT, "%s: has no frame %d; its frames are %d to %d", out, frame, entry[0].number,
-                           entry[n - 1].number);
-done:
-    silt_walls_clear(&walls);
-    silt_scene_free(&scene);
-    free(entry);
-    free(path);
+        status = silt_fail(err, SILT_INPUT, "%s: has no frame %d; its frames are %d to %d", out, def->frame, book.entry[0].number,
+                           book.entry[n - 1].number);
+    silt_draw_close(&book);
     return status;
 }

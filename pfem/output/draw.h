@@ -34,16 +34,21 @@ typedef struct silt_draw_field {
     int n_map;
 } silt_draw_field;
 
+/** what a picture may show or leave out */
+typedef enum { DRAW_WATER = 1, DRAW_BED = 2, DRAW_GRAINS = 4, DRAW_BODIES = 8, DRAW_WALLS = 16 } silt_draw_part;
+
 /** fixed for all pictures of a run, then the picture being drawn */
 typedef struct silt_draw_canvas {
     const char *out;
     const silt_scene *scene;
     silt_walls *walls; // of the scene, moved to the time of the picture; NULL: none
+    unsigned without;  // silt_draw_part: what is left out
     const silt_draw_field *field;
     double lo[3], hi[3]; // m, the plot's extent; in 3-D the box that is shown
     int slice;           // 3-D: 1 to 3: a cut across x, y or z, drawn in the plane; 0: none
     double slice_at;     // m
     double low, high;    // colour range
+    bool plain;          // nothing is coloured by value: no colour bar
     double density;      // kg/m3, largest density of the bed
     double scale;        // pixels per metre
     int width, height;   // of the plot, pixels
@@ -51,6 +56,27 @@ typedef struct silt_draw_canvas {
     cairo_surface_t *surface;
     cairo_t *cr;
 } silt_draw_canvas;
+
+// draw.c: the canvas of a run
+/** what stays from picture to picture, owned by who opened it */
+typedef struct silt_draw_book {
+    silt_scene *scene;
+    silt_walls walls;
+    silt_frame_entry *entry;
+    int n_frame;
+} silt_draw_book;
+/** Finds the run's frames, reads its scene, fixes extent, colours and size of the pictures. Errors: SILT_INPUT for what cannot be drawn so,
+ * SILT_FAILED without frames. @param frame  of def is not looked at */
+silt_status silt_draw_open(silt_draw_canvas *c, silt_draw_book *book, const char *out, const silt_draw_def *def, silt_error *err);
+void silt_draw_close(silt_draw_book *book);
+/** the picture of a frame, owned by the caller */
+cairo_surface_t *silt_draw_picture(silt_draw_canvas *c, const silt_frame_entry *entry);
+static inline bool silt_draw_shows(const silt_draw_canvas *c, silt_draw_part part) { return !(c->without & (unsigned)part); }
+
+// draw_film.c
+/** All frames as one moving picture. The file's ending says which kind: mp4, webm, webp, gif; made by ffmpeg, which must be
+ * installed. */
+silt_status silt_draw_film(silt_draw_canvas *c, const silt_draw_book *book, const char *path, silt_error *err);
 
 // draw_ink.c: colours, texts, the colour bar
 silt_draw_colour silt_draw_hex(unsigned c);
@@ -66,8 +92,10 @@ void silt_draw_text(cairo_t *cr, double x, double y, int align, double size, boo
 /** digits after the point that a step needs */
 void silt_draw_number(char text[32], double value, double step);
 void silt_draw_bar(silt_draw_canvas *c);
-/** The grid of a frame, or its cut, with one value a point: a vector's length, or what the field makes.
- * @return false: no such file */
+/** array that colours the grains, where there is no water to show it; NULL: none */
+const char *silt_draw_grain_array(const silt_draw_canvas *c);
+/** The grid of a frame, or its cut (bodies are not cut), with one value a point: a vector's length, or what the field makes.
+ * @return false: no such file, or the part is left out */
 bool silt_draw_read(const silt_draw_canvas *c, silt_grid *grid, const char *part, int number, const char *array);
 /** takes the values of the points with counts[i] into the colour range */
 void silt_draw_range(silt_draw_canvas *c, const silt_grid *grid, const bool *counts);
@@ -78,12 +106,22 @@ void silt_draw_range_round(silt_draw_canvas *c);
 /** extent and colour range over some frames of the whole run, then the plot's size in pixels */
 void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, int n_frame);
 void silt_draw_flat(silt_draw_canvas *c, const silt_frame_entry *entry);
+/** Edges of the triangles: those of one triangle only, or all, once each. @return how many; owned by the caller */
+int silt_draw_edges(const silt_grid *grid, bool all, int (**edge)[2]);
 // draw_slice.c
 /** puts the cut through the canvas' plane in place of a grid of tetrahedra */
 void silt_draw_slice(const silt_draw_canvas *c, silt_grid *grid);
+/** the same for grains: the circles in which the plane cuts them */
+void silt_draw_slice_grains(const silt_draw_canvas *c, silt_grid *grid);
+/** Faces of bodies as lines in the canvas' plane, m. @return how many; owned by the caller */
+int silt_draw_slice_faces(const silt_draw_canvas *c, const silt_grid *grid, double (**line)[4]);
 /** Walls as lines in the picture's plane, m: those that move (2-D), or the cut ones. @return how many; owned by the
  * caller */
 int silt_draw_lines(const silt_draw_canvas *c, double (**line)[4]);
+/** faces of tetrahedra that no other one has, counter-clockwise from outside. @return how many; owned by the caller */
+int silt_draw_outside(const silt_grid *grid, int (**face)[3]);
+/** an edge of a wall in space that shows: at the border, or where the wall bends by more than 20 degrees */
+bool silt_draw_sharp(const silt_walls *walls, int element, int edge);
 void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, int n_frame);
 void silt_draw_space(silt_draw_canvas *c, const silt_frame_entry *entry);
 

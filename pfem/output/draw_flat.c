@@ -20,7 +20,7 @@ static void draw_extend(double lo[2], double hi[2], double x, double y) {
 // pixels per metre, aspect 1:1; a flat scene gets air above, a high and narrow one gets room at the sides
 static void draw_layout(silt_draw_canvas *c) {
     double wide = c->hi[0] - c->lo[0], high = c->hi[1] - c->lo[1];
-    c->right = c->field->label ? MARGIN_BAR : MARGIN_RIGHT;
+    c->right = c->plain ? MARGIN_RIGHT : MARGIN_BAR;
     c->scale = silt_min((PICTURE_WIDTH - MARGIN_LEFT - c->right) / wide, PLOT_HEIGHT / high);
     if (high * c->scale < PLOT_LOW)
         c->hi[1] = c->lo[1] + PLOT_LOW / c->scale;
@@ -31,11 +31,6 @@ static void draw_layout(silt_draw_canvas *c) {
     }
     c->width = (int)lround((c->hi[0] - c->lo[0]) * c->scale);
     c->height = (int)lround((c->hi[1] - c->lo[1]) * c->scale);
-}
-
-// array that colours the grains, where there is no water to show it
-static const char *draw_grain_array(const silt_draw_canvas *c) {
-    return !c->scene->fluid.on && strcmp(c->field->name, "speed") == 0 ? c->field->water : NULL;
 }
 
 void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, int n_frame) {
@@ -56,9 +51,9 @@ void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, i
     for (int s = 0; s < samples; s++) {
         int number = entry[samples > 1 ? (int)((long)s * (n_frame - 1) / (samples - 1)) : 0].number;
         static const char *const part[] = {"fluid", "bed", "grains", "bodies"};
-        for (int k = 0; k < (c->slice ? 2 : 4); k++) {
+        for (int k = 0; k < (c->slice ? 3 : 4); k++) {
             silt_grid grid;
-            const char *array = k == 0 ? c->field->water : k == 1 ? c->field->bed : k == 2 ? draw_grain_array(c) : NULL;
+            const char *array = k == 0 ? c->field->water : k == 1 ? c->field->bed : k == 2 ? silt_draw_grain_array(c) : NULL;
             if (!silt_draw_read(c, &grid, part[k], number, array))
                 continue;
             bool *counts = silt_alloc((size_t)grid.n_point + 1, sizeof *counts);
@@ -148,9 +143,8 @@ static int draw_edge_order(const void *a, const void *b) {
     return p[0] != q[0] ? (p[0] > q[0]) - (p[0] < q[0]) : (p[1] > q[1]) - (p[1] < q[1]);
 }
 
-// lines along the edges of the triangles: those of one triangle only, or all
-static void draw_edges(silt_draw_canvas *c, const silt_grid *grid, bool all, unsigned ink, double width) {
-    int(*edge)[2] = silt_alloc(3 * (size_t)grid->n_cell + 1, sizeof *edge), n = 0;
+int silt_draw_edges(const silt_grid *grid, bool all, int (**out)[2]) {
+    int(*edge)[2] = silt_alloc(3 * (size_t)grid->n_cell + 1, sizeof *edge), n = 0, kept = 0;
     for (int i = 0; i < grid->n_cell; i++) {
         for (int k = 0; silt_grid_corners(grid, i) == 3 && k < 3; k++) {
             int a = grid->link[grid->offset[i] + k], b = grid->link[grid->offset[i] + (k + 1) % 3];
@@ -159,13 +153,22 @@ static void draw_edges(silt_draw_canvas *c, const silt_grid *grid, bool all, uns
         }
     }
     qsort(edge, (size_t)n, sizeof *edge, draw_edge_order);
-    silt_draw_ink(c->cr, ink);
-    cairo_set_line_width(c->cr, width);
     for (int i = 0, same; i < n; i += same) {
         for (same = 1; i + same < n && draw_edge_order(edge[i], edge[i + same]) == 0;)
             same++;
-        if (same > 1 && !all)
-            continue;
+        if (same == 1 || all)
+            memcpy(edge[kept++], edge[i], sizeof *edge);
+    }
+    *out = edge;
+    return kept;
+}
+
+static void draw_edges(silt_draw_canvas *c, const silt_grid *grid, bool all, unsigned ink, double width) {
+    int(*edge)[2];
+    const int n = silt_draw_edges(grid, all, &edge);
+    silt_draw_ink(c->cr, ink);
+    cairo_set_line_width(c->cr, width);
+    for (int i = 0; i < n; i++) {
         cairo_move_to(c->cr, draw_x(c, grid->x[3 * edge[i][0]]), draw_y(c, grid->x[3 * edge[i][0] + 1]));
         cairo_line_to(c->cr, draw_x(c, grid->x[3 * edge[i][1]]), draw_y(c, grid->x[3 * edge[i][1] + 1]));
         cairo_stroke(c->cr);
@@ -224,7 +227,7 @@ static void draw_bed(silt_draw_canvas *c, int number) {
 
 static void draw_grains(silt_draw_canvas *c, int number) {
     silt_grid grid;
-    if (!silt_draw_read(c, &grid, "grains", number, draw_grain_array(c)))
+    if (!silt_draw_read(c, &grid, "grains", number, silt_draw_grain_array(c)))
         return;
     for (int i = 0; i < grid.n_point; i++) {
         const silt_draw_colour speed = grid.value ? silt_draw_value(c, grid.value[i]) : (silt_draw_colour){0};
@@ -241,19 +244,60 @@ static void draw_grains(silt_draw_canvas *c, int number) {
     silt_grid_clear(&grid);
 }
 
+static const unsigned draw_stone = 0xb9b4ac, draw_stone_edge = 0x3a3733;
+
+static int draw_rising(const void *a, const void *b) {
+    const double *p = a, *q = b;
+    return (*p > *q) - (*p < *q);
+}
+
+// fills what the lines of a cut enclose, row by row between every other crossing, then draws the lines
+static void draw_cut_bodies(silt_draw_canvas *c, const silt_grid *grid) {
+    double(*line)[4], *at = NULL;
+    const int n = silt_draw_slice_faces(c, grid, &line);
+    int capacity = 0;
+    silt_draw_ink(c->cr, draw_stone);
+    for (int y = MARGIN_TOP; y < MARGIN_TOP + c->height; y++) {
+        int m = 0;
+        for (int i = 0; i < n; i++) {
+            const double p = draw_y(c, line[i][1]) - y - 0.5, q = draw_y(c, line[i][3]) - y - 0.5;
+            if ((p < 0) == (q < 0))
+                continue;
+            SILT_RESERVE(at, capacity, m + 1);
+            at[m++] = draw_x(c, line[i][0] + (line[i][2] - line[i][0]) * p / (p - q));
+        }
+        if (m > 0)
+            qsort(at, (size_t)m, sizeof *at, draw_rising);
+        for (int k = 0; k + 1 < m; k += 2)
+            cairo_rectangle(c->cr, at[k], y, at[k + 1] - at[k], 1);
+    }
+    cairo_fill(c->cr);
+    silt_draw_ink(c->cr, draw_stone_edge);
+    cairo_set_line_width(c->cr, 1.6);
+    for (int i = 0; i < n; i++) {
+        cairo_move_to(c->cr, draw_x(c, line[i][0]), draw_y(c, line[i][1]));
+        cairo_line_to(c->cr, draw_x(c, line[i][2]), draw_y(c, line[i][3]));
+    }
+    cairo_stroke(c->cr);
+    free(line);
+    free(at);
+}
+
 static void draw_bodies(silt_draw_canvas *c, int number) {
     silt_grid grid;
-    if (!silt_grid_read(&grid, c->out, "bodies", number, NULL))
+    if (!silt_draw_read(c, &grid, "bodies", number, NULL))
         return;
-    for (int i = 0; i < grid.n_cell; i++) {
+    if (c->slice)
+        draw_cut_bodies(c, &grid);
+    for (int i = 0; i < grid.n_cell && !c->slice; i++) {
         for (int k = grid.offset[i]; k < grid.offset[i + 1]; k++) {
             const double *x = grid.x + 3 * grid.link[k];
             cairo_line_to(c->cr, draw_x(c, x[0]), draw_y(c, x[1]));
         }
         cairo_close_path(c->cr);
-        silt_draw_ink(c->cr, 0xb9b4ac);
+        silt_draw_ink(c->cr, draw_stone);
         cairo_fill_preserve(c->cr);
-        silt_draw_ink(c->cr, 0x3a3733);
+        silt_draw_ink(c->cr, draw_stone_edge);
         cairo_set_line_width(c->cr, 1.6);
         cairo_stroke(c->cr);
     }
@@ -264,7 +308,7 @@ static void draw_walls(silt_draw_canvas *c) {
     silt_draw_ink(c->cr, 0x2b2b2b);
     cairo_set_line_width(c->cr, 3);
     cairo_set_line_join(c->cr, CAIRO_LINE_JOIN_MITER);
-    for (int i = 0; i < c->scene->n_wall && !c->slice; i++) {
+    for (int i = 0; i < c->scene->n_wall && !c->slice && silt_draw_shows(c, DRAW_WALLS); i++) {
         const silt_wall *wall = &c->scene->wall[i];
         for (int k = 0; k < wall->n_point && wall->motion.n_row == 0; k++)
             cairo_line_to(c->cr, draw_x(c, wall->point[3 * k]), draw_y(c, wall->point[3 * k + 1]));
@@ -326,10 +370,8 @@ void silt_draw_flat(silt_draw_canvas *c, const silt_frame_entry *entry) {
     cairo_clip(c->cr);
     draw_water(c, entry->number);
     draw_bed(c, entry->number);
-    if (!c->slice) {
-        draw_grains(c, entry->number);
-        draw_bodies(c, entry->number);
-    }
+    draw_grains(c, entry->number);
+    draw_bodies(c, entry->number);
     draw_walls(c);
     cairo_restore(c->cr);
     draw_axes(c);

@@ -52,8 +52,22 @@ static void draw_vorticity(silt_grid *grid) {
     free(curl);
 }
 
+const char *silt_draw_grain_array(const silt_draw_canvas *c) {
+    return !c->scene->fluid.on && strcmp(c->field->name, "speed") == 0 ? c->field->water : NULL;
+}
+
+// the part of the picture that a file of a frame belongs to
+static silt_draw_part draw_part(const char *part) {
+    return strcmp(part, "bed") == 0      ? DRAW_BED
+           : strcmp(part, "grains") == 0 ? DRAW_GRAINS
+           : strcmp(part, "bodies") == 0 ? DRAW_BODIES
+                                         : DRAW_WATER;
+}
+
 bool silt_draw_read(const silt_draw_canvas *c, silt_grid *grid, const char *part, int number, const char *array) {
-    if (!silt_grid_read(grid, c->out, part, number, array))
+    const silt_draw_part shown = draw_part(part);
+    memset(grid, 0, sizeof *grid);
+    if (!silt_draw_shows(c, shown) || !silt_grid_read(grid, c->out, part, number, array))
         return false;
     if (array && c->field->made == MADE_ELEVATION) {
         free(grid->value);
@@ -69,7 +83,9 @@ bool silt_draw_read(const silt_draw_canvas *c, silt_grid *grid, const char *part
         }
     }
     grid->width = grid->value ? 1 : 0;
-    if (c->slice)
+    if (c->slice && shown == DRAW_GRAINS)
+        silt_draw_slice_grains(c, grid);
+    else if (c->slice && shown != DRAW_BODIES)
         silt_draw_slice(c, grid);
     return true;
 }
@@ -100,6 +116,7 @@ void silt_draw_range_round(silt_draw_canvas *c) {
         c->high = silt_max(fabs(c->low), fabs(c->high));
         c->low = -c->high;
     }
+    c->plain = !c->field->label || !(c->low < HUGE_VAL);
     if (!(c->low < HUGE_VAL))
         c->low = 0, c->high = 1;
     if (c->low > 0 && c->low < 0.5 * c->high)
@@ -142,7 +159,7 @@ void silt_draw_number(char text[32], double value, double step) {
 }
 
 void silt_draw_bar(silt_draw_canvas *c) {
-    if (!c->field->label)
+    if (c->plain)
         return;
     cairo_t *cr = c->cr;
     double x = MARGIN_LEFT + c->width + 26, width = 18, high = silt_min(c->height, 420);

@@ -103,6 +103,55 @@ void silt_draw_slice(const silt_draw_canvas *c, silt_grid *grid) {
     *grid = cut;
 }
 
+void silt_draw_slice_grains(const silt_draw_canvas *c, silt_grid *grid) {
+    const int axis = c->slice - 1;
+    int right, up, n = 0;
+    slice_axes(axis, &right, &up);
+    for (int i = 0; i < grid->n_point; i++) {
+        const double *x = grid->x + 3 * i, at[3] = {x[right], x[up], 0};
+        const double rest = silt_square(grid->radius ? grid->radius[i] : 0) - silt_square(x[axis] - c->slice_at);
+        if (!(rest > 0))
+            continue;
+        memcpy(grid->x + 3 * n, at, sizeof at);
+        grid->radius[n] = sqrt(rest);
+        if (grid->value)
+            grid->value[n] = grid->value[i];
+        grid->link[n] = grid->offset[n] = n;
+        n++;
+    }
+    grid->offset[n] = n;
+    grid->n_point = grid->n_cell = n;
+}
+
+// the line in which the plane cuts a triangle; @return false: it does not
+static bool slice_line(const silt_draw_canvas *c, const double *const corner[3], int right, int up, double at[4]) {
+    int ends = 0;
+    for (int k = 0; k < 3; k++) {
+        const double *a = corner[k], *b = corner[(k + 1) % 3];
+        const double p = a[c->slice - 1] - c->slice_at, q = b[c->slice - 1] - c->slice_at;
+        if ((p < 0) == (q < 0) || ends == 2)
+            continue;
+        at[2 * ends] = a[right] + (b[right] - a[right]) * p / (p - q);
+        at[2 * ends + 1] = a[up] + (b[up] - a[up]) * p / (p - q);
+        ends++;
+    }
+    return ends == 2;
+}
+
+int silt_draw_slice_faces(const silt_draw_canvas *c, const silt_grid *grid, double (**line)[4]) {
+    int n = 0, capacity = 0, right, up;
+    slice_axes(c->slice - 1, &right, &up);
+    *line = NULL;
+    for (int i = 0; i < grid->n_cell; i++)
+        for (int k = grid->offset[i] + 1; k + 1 < grid->offset[i + 1]; k++) {
+            const double *const corner[3] = {grid->x + 3 * grid->link[grid->offset[i]], grid->x + 3 * grid->link[k],
+                                             grid->x + 3 * grid->link[k + 1]};
+            SILT_RESERVE(*line, capacity, n + 1);
+            n += slice_line(c, corner, right, up, (*line)[n]);
+        }
+    return n;
+}
+
 int silt_draw_lines(const silt_draw_canvas *c, double (**line)[4]) {
     const silt_walls *walls = c->walls;
     int n = 0, right = 0, up = 1;
@@ -120,17 +169,8 @@ int silt_draw_lines(const silt_draw_canvas *c, double (**line)[4]) {
             n++;
             continue;
         }
-        int ends = 0;
-        for (int k = 0; k < 3 && walls->corner; k++) {
-            const double *a = walls->corner[i][k], *b = walls->corner[i][(k + 1) % 3];
-            const double p = a[c->slice - 1] - c->slice_at, q = b[c->slice - 1] - c->slice_at;
-            if ((p < 0) == (q < 0) || ends == 2)
-                continue;
-            at[2 * ends] = a[right] + (b[right] - a[right]) * p / (p - q);
-            at[2 * ends + 1] = a[up] + (b[up] - a[up]) * p / (p - q);
-            ends++;
-        }
-        n += ends == 2;
+        const double *const corner[3] = {walls->corner[i][0], walls->corner[i][1], walls->corner[i][2]};
+        n += slice_line(c, corner, right, up, at);
     }
     return n;
 }

@@ -193,7 +193,7 @@ static double space_lift(const space *s) {
 }
 
 // an edge that shows: at the wall's border, or where it bends by more than 20 degrees
-static bool space_sharp(const silt_walls *walls, int element, int edge) {
+bool silt_draw_sharp(const silt_walls *walls, int element, int edge) {
     const int other = walls->joined[element][edge];
     if (other < 0)
         return true;
@@ -216,7 +216,7 @@ static void space_walls(space *s, const silt_walls *walls) {
             space_fill(s, &face);
         }
         for (int k = 0; k < 3; k++)
-            if (walls->joined && space_sharp(walls, i, k)) {
+            if (walls->joined && silt_draw_sharp(walls, i, k)) {
                 const int other = walls->joined[i][k];
                 const bool seen = facing > 0 || (other >= 0 && space_dot(walls->normal[other], s->eye) > 0);
                 space_line(s, walls->corner[i][k], walls->corner[i][(k + 1) % 3], lift, seen ? 2.2 : 1.2,
@@ -262,7 +262,7 @@ static void space_water(space *s, int number) {
         silt_grid_clear(&grid);
     }
     // drops
-    if (silt_grid_read(&grid, s->c->out, "fluid", number, NULL)) {
+    if (silt_draw_read(s->c, &grid, "fluid", number, NULL)) {
         for (int i = 0; i < grid.n_cell; i++) {
             const int node = grid.link[grid.offset[i]];
             if (silt_grid_corners(&grid, i) == 1 && (!grid.kind || grid.kind[node] == NODE_FLUID))
@@ -270,16 +270,37 @@ static void space_water(space *s, int number) {
         }
         silt_grid_clear(&grid);
     }
-    if (silt_grid_read(&grid, s->c->out, "grains", number, NULL)) {
+    if (silt_draw_read(s->c, &grid, "grains", number, silt_draw_grain_array(s->c))) {
         for (int i = 0; i < grid.n_point; i++)
-            space_ball(s, grid.x + 3 * i, grid.radius ? grid.radius[i] : 0, 1.2 * SPACE_FINE, silt_draw_hex(0xd9a441));
+            space_ball(s, grid.x + 3 * i, grid.radius ? grid.radius[i] : 0, 1.2 * SPACE_FINE,
+                       grid.value ? silt_draw_value(s->c, grid.value[i]) : silt_draw_hex(0xd9a441));
         silt_grid_clear(&grid);
     }
 }
 
+// faces of the bodies, lines where they bend: polygons are taken as fans
+static void space_bodies(space *s, int number) {
+    const silt_draw_colour stone = silt_draw_hex(0xb9b4ac);
+    silt_grid grid;
+    if (!silt_draw_read(s->c, &grid, "bodies", number, NULL))
+        return;
+    for (int i = 0; i < grid.n_cell; i++)
+        for (int k = grid.offset[i] + 1; k + 1 < grid.offset[i + 1]; k++) {
+            space_face face = {.x = {grid.x + 3 * grid.link[grid.offset[i]], grid.x + 3 * grid.link[k], grid.x + 3 * grid.link[k + 1]},
+                               .flat = stone, .plain = 0.5, .lit = 0.55};
+            space_normal(face.x[0], face.x[1], face.x[2], face.normal[0]);
+            space_unit(face.normal[0]);
+            memcpy(face.normal[1], face.normal[0], sizeof face.normal[0]);
+            memcpy(face.normal[2], face.normal[0], sizeof face.normal[0]);
+            if (space_dot(face.normal[0], s->eye) > 0)
+                space_fill(s, &face);
+        }
+    silt_grid_clear(&grid);
+}
+
 // ---------------------------------------------------------------- bed
 
-/** a face of a cell of the bed: its corners rising, the corner opposite */
+/** a face of a cell: its corners rising, the corner opposite */
 typedef struct space_side {
     int node[3], opposite;
 } space_side;
@@ -292,33 +313,49 @@ static int compare_side(const void *p, const void *q) {
     return 0;
 }
 
-// the faces of the bed's cells that no other cell has; out, owned by the caller. @return how many
-static int space_outside(const silt_grid *grid, space_side **out) {
+// the face of a cell opposite its corner k
+static space_side space_side_of(const silt_grid *grid, int cell, int k) {
+    space_side side = {.opposite = -1};
+    int m = 0;
+    for (int a = 0; a < 4; a++) {
+        const int at = grid->link[grid->offset[cell] + a];
+        int to = m;
+        if (a == k) {
+            side.opposite = at;
+            continue;
+        }
+        for (; to > 0 && side.node[to - 1] > at; to--)
+            side.node[to] = side.node[to - 1];
+        side.node[to] = at;
+        m++;
+    }
+    return side;
+}
+
+int silt_draw_outside(const silt_grid *grid, int (**face)[3]) {
     space_side *side = silt_alloc(4 * (size_t)grid->n_cell + 1, sizeof *side);
     int n = 0, kept = 0;
     for (int i = 0; i < grid->n_cell; i++)
-        for (int k = 0; k < 4 && silt_grid_corners(grid, i) == 4; k++, n++) {
-            int *node = side[n].node, m = 0;
-            for (int a = 0; a < 4; a++) {
-                const int at = grid->link[grid->offset[i] + a];
-                int to = m;
-                if (a == k) {
-                    side[n].opposite = at;
-                    continue;
-                }
-                for (; to > 0 && node[to - 1] > at; to--)
-                    node[to] = node[to - 1];
-                node[to] = at;
-                m++;
-            }
-        }
+        for (int k = 0; k < 4 && silt_grid_corners(grid, i) == 4; k++)
+            side[n++] = space_side_of(grid, i, k);
     qsort(side, (size_t)n, sizeof *side, compare_side);
-    for (int i = 0; i < n; i++)
-        if (i + 1 < n && compare_side(&side[i], &side[i + 1]) == 0)
+    *face = silt_alloc((size_t)n + 1, sizeof **face);
+    for (int i = 0; i < n; i++) {
+        if (i + 1 < n && compare_side(&side[i], &side[i + 1]) == 0) {
             i++;
-        else
-            side[kept++] = side[i];
-    *out = side;
+            continue;
+        }
+        const double *x = grid->x + 3 * side[i].node[0];
+        double normal[3], in[3];
+        space_normal(x, grid->x + 3 * side[i].node[1], grid->x + 3 * side[i].node[2], normal);
+        for (int d = 0; d < 3; d++)
+            in[d] = grid->x[3 * side[i].opposite + d] - x[d];
+        const bool turned = space_dot(normal, in) > 0;
+        (*face)[kept][0] = side[i].node[0];
+        (*face)[kept][1] = side[i].node[turned ? 2 : 1];
+        (*face)[kept++][2] = side[i].node[turned ? 1 : 2];
+    }
+    free(side);
     return kept;
 }
 
@@ -328,23 +365,18 @@ static void space_bed(space *s, int number) {
     silt_grid grid;
     if (!silt_draw_read(s->c, &grid, "bed", number, s->c->field->bed))
         return;
-    space_side *side;
-    const int n = space_outside(&grid, &side);
+    int(*side)[3];
+    const int n = silt_draw_outside(&grid, &side);
     for (int i = 0; i < n; i++) {
         space_face face = {.flat = sand, .coloured = grid.value != NULL, .plain = 0.62, .lit = 0.42};
-        double normal[3], in[3];
-        for (int k = 0; k < 3; k++)
-            face.x[k] = grid.x + 3 * side[i].node[k];
-        space_normal(face.x[0], face.x[1], face.x[2], normal);
-        space_unit(normal);
-        for (int d = 0; d < 3; d++)
-            in[d] = grid.x[3 * side[i].opposite + d] - face.x[0][d];
-        const double turn = space_dot(normal, in) > 0 ? -1 : 1;
         for (int k = 0; k < 3; k++) {
-            for (int d = 0; d < 3; d++)
-                face.normal[k][d] = turn * normal[d];
-            face.value[k] = grid.value ? grid.value[side[i].node[k]] : 0;
+            face.x[k] = grid.x + 3 * side[i][k];
+            face.value[k] = grid.value ? grid.value[side[i][k]] : 0;
         }
+        space_normal(face.x[0], face.x[1], face.x[2], face.normal[0]);
+        space_unit(face.normal[0]);
+        memcpy(face.normal[1], face.normal[0], sizeof face.normal[0]);
+        memcpy(face.normal[2], face.normal[0], sizeof face.normal[0]);
         if (space_dot(face.normal[0], s->eye) <= 0)
             continue;
         space_fill(s, &face);
@@ -431,9 +463,11 @@ void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, 
     int samples = n_frame < DRAW_SAMPLES ? n_frame : DRAW_SAMPLES;
     for (int k = 0; k < samples; k++) {
         int number = entry[samples > 1 ? (int)((long)k * (n_frame - 1) / (samples - 1)) : 0].number;
-        for (int part = 0; part < 2; part++) {
+        static const char *const name[] = {"surface", "bed", "grains", "bodies"};
+        const char *const array[] = {c->field->water, c->field->bed, silt_draw_grain_array(c), NULL};
+        for (int part = 0; part < 4; part++) {
             silt_grid grid;
-            if (!silt_draw_read(c, &grid, part ? "bed" : "surface", number, part ? c->field->bed : c->field->water))
+            if (!silt_draw_read(c, &grid, name[part], number, array[part]))
                 continue;
             bool *counts = silt_alloc((size_t)grid.n_point + 1, sizeof *counts);
             for (int i = 0; i < grid.n_point; i++) {
@@ -464,7 +498,7 @@ void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, 
     space s = {.c = c};
     space_frame(&s);
     const double wide = s.hi[0] - s.lo[0], high = s.hi[1] - s.lo[1];
-    c->right = c->field->label ? MARGIN_BAR : MARGIN_RIGHT;
+    c->right = c->plain ? MARGIN_RIGHT : MARGIN_BAR;
     c->scale = silt_min((PICTURE_WIDTH - MARGIN_LEFT - c->right) / wide, PLOT_HEIGHT / high);
     c->width = (int)silt_max(PLOT_NARROW, lround(wide * c->scale));
     c->height = (int)silt_max(PLOT_LOW, lround(high * c->scale));
@@ -507,6 +541,7 @@ void silt_draw_space(silt_draw_canvas *c, const silt_frame_entry *entry) {
     if (c->walls && c->walls->corner)
         space_walls(&s, c->walls);
     space_bed(&s, entry->number);
+    space_bodies(&s, entry->number);
     space_water(&s, entry->number);
     space_show(&s);
     space_scales(&s);

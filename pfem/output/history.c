@@ -245,9 +245,8 @@ static void history_body(FILE *to, const silt_body_state *bodies, int i) {
     history_vector(to, 3, b->contact);
 }
 
-silt_status silt_history_row(silt_history *history, const silt_view *view, const double *gauge, silt_error *err) {
+static void history_write(const silt_history *history, FILE *to, const silt_view *view, const double *gauge) {
     const silt_scene *scene = history->scene;
-    FILE *to = history->file;
     fprintf(to, "%lld,%.17g,%.17g", (long long)view->step, view->time, view->dt);
     if (scene->fluid.on)
         fprintf(to, ",%d,%d", view->nodes ? view->nodes->count : 0, view->mesh ? view->mesh->n_cell : 0);
@@ -266,10 +265,33 @@ silt_status silt_history_row(silt_history *history, const silt_view *view, const
     for (int i = 0; i < PHASE_COUNT; i++)
         fprintf(to, ",%.6g", view->wall[i]);
     fputc('\n', to);
+}
+
+silt_status silt_history_row(silt_history *history, const silt_view *view, const double *gauge, silt_error *err) {
+    history_write(history, history->file, view, gauge);
     // a killed run leaves whole rows
-    if (fflush(to) != 0)
+    if (fflush(history->file) != 0)
         return silt_fail(err, SILT_FAILED, "%s: cannot be written (%s)", history->path, strerror(errno));
     return SILT_OK;
+}
+
+double silt_history_value(silt_history *history, const silt_view *view, const double *gauge, const char *column) {
+    char *row = NULL, *name = history_header(history->scene), *next_name, *next;
+    size_t size;
+    double value = NAN;
+    FILE *to = open_memstream(&row, &size);
+    history_write(history, to, view, gauge);
+    fclose(to);
+    const char *word = strtok_r(name, ",\n", &next_name), *number = strtok_r(row, ",\n", &next);
+    while (word && number && strcmp(word, column) != 0) {
+        word = strtok_r(NULL, ",\n", &next_name);
+        number = strtok_r(NULL, ",\n", &next);
+    }
+    if (word && number)
+        value = strtod(number, NULL);
+    free(name);
+    free(row);
+    return value;
 }
 
 silt_status silt_history_sync(silt_history *history, silt_error *err) {

@@ -60,7 +60,7 @@ static void info_model(const silt_scene *scene, FILE *to) {
         fprintf(to, "  periodic   in x from %g to %g m\n", scene->period[0], scene->period[1]);
 }
 
-static void info_scene(const silt_scene *scene, FILE *to) {
+void silt_info_scene(const silt_scene *scene, FILE *to) {
     const silt_fluid_def *fluid = &scene->fluid;
     const silt_bed_def *bed = &scene->bed;
     fprintf(to, "%s\n", scene->title && *scene->title ? scene->title : "untitled");
@@ -99,14 +99,28 @@ static void info_scene(const silt_scene *scene, FILE *to) {
 
 // ---------------------------------------------------------------- an output folder
 
-static const char *info_text(struct fy_document *summary, const char *key) {
-    struct fy_node *node = fy_node_by_path(fy_document_root(summary), key, FY_NT, FYNWF_DONT_FOLLOW);
+struct fy_document *silt_summary_open(const char *out) {
+    char *path = silt_text("%s/summary.json", out);
+    struct stat file;
+    struct fy_document *summary = NULL;
+    if (stat(path, &file) == 0)
+        summary = fy_document_build_from_file(&(struct fy_parse_cfg){.flags = FYPCF_QUIET | FYPCF_JSON_AUTO}, path);
+    free(path);
+    return summary;
+}
+
+void silt_summary_close(struct fy_document *summary) {
+    fy_document_destroy(summary);
+}
+
+const char *silt_summary_text(struct fy_document *summary, const char *key) {
+    struct fy_node *node = summary ? fy_node_by_path(fy_document_root(summary), key, FY_NT, FYNWF_DONT_FOLLOW) : NULL;
     const char *text = node && fy_node_is_scalar(node) ? fy_node_get_scalar0(node) : NULL;
     return text ? text : "";
 }
 
-static double info_number(struct fy_document *summary, const char *key) {
-    return atof(info_text(summary, key));
+double silt_summary_number(struct fy_document *summary, const char *key) {
+    return atof(silt_summary_text(summary, key));
 }
 
 static void info_summary(struct fy_document *summary, FILE *to) {
@@ -115,30 +129,30 @@ static void info_summary(struct fy_document *summary, FILE *to) {
         SILT_PHASES(X)
 #undef X
     };
-    const char *title = info_text(summary, "/title"), *message = info_text(summary, "/message");
+    const char *title = silt_summary_text(summary, "/title"), *message = silt_summary_text(summary, "/message");
     fprintf(to, "%s\n", *title ? title : "untitled");
-    fprintf(to, "  status     %s%s%s (silt %s)\n", info_text(summary, "/status"), *message ? ": " : "", message,
-            info_text(summary, "/version"));
-    fprintf(to, "  reached    %g of %g s in %.0f steps\n", info_number(summary, "/time"),
-            info_number(summary, "/time_end"), info_number(summary, "/steps"));
-    fprintf(to, "  nodes      %.0f, grains %.0f\n", info_number(summary, "/nodes"), info_number(summary, "/grains"));
-    fprintf(to, "  took       %.4g s, %.3g us per node and step, %.0f MB\n", info_number(summary, "/seconds"),
-            info_number(summary, "/microseconds_per_node_step"), info_number(summary, "/peak_memory_bytes") / 1e6);
+    fprintf(to, "  status     %s%s%s (silt %s)\n", silt_summary_text(summary, "/status"), *message ? ": " : "", message,
+            silt_summary_text(summary, "/version"));
+    fprintf(to, "  reached    %g of %g s in %.0f steps\n", silt_summary_number(summary, "/time"),
+            silt_summary_number(summary, "/time_end"), silt_summary_number(summary, "/steps"));
+    fprintf(to, "  nodes      %.0f, grains %.0f\n", silt_summary_number(summary, "/nodes"), silt_summary_number(summary, "/grains"));
+    fprintf(to, "  took       %.4g s, %.3g us per node and step, %.0f MB\n", silt_summary_number(summary, "/seconds"),
+            silt_summary_number(summary, "/microseconds_per_node_step"), silt_summary_number(summary, "/peak_memory_bytes") / 1e6);
     fprintf(to, "  phases    ");
     for (int i = 0; i < PHASE_COUNT; i++) {
         char key[80];
         snprintf(key, sizeof key, "/phases/%s/seconds", phase[i]);
-        fprintf(to, " %s %.3g s%s", phase[i], info_number(summary, key), i + 1 < PHASE_COUNT ? "," : "\n");
+        fprintf(to, " %s %.3g s%s", phase[i], silt_summary_number(summary, key), i + 1 < PHASE_COUNT ? "," : "\n");
     }
     fprintf(to, "  worst      volume error %.3e, sediment error %.3e, momentum error %.3e\n",
-            info_number(summary, "/worst_volume_error"), info_number(summary, "/worst_sediment_error"),
-            info_number(summary, "/worst_momentum_error"));
+            silt_summary_number(summary, "/worst_volume_error"), silt_summary_number(summary, "/worst_sediment_error"),
+            silt_summary_number(summary, "/worst_momentum_error"));
     struct fy_node *checks = fy_node_by_path(fy_document_root(summary), "/checks", FY_NT, FYNWF_DONT_FOLLOW);
     int n = checks ? fy_node_sequence_item_count(checks) : 0, passed = 0;
     for (int i = 0; i < n; i++) {
         char key[40];
         snprintf(key, sizeof key, "/checks/%d/pass", i);
-        passed += strcmp(info_text(summary, key), "true") == 0;
+        passed += strcmp(silt_summary_text(summary, key), "true") == 0;
     }
     fprintf(to, "  checks     %d of %d pass\n", passed > 0 ? passed : 0, n > 0 ? n : 0);
 }
@@ -162,7 +176,7 @@ static void info_last_row(const char *out, FILE *to) {
 }
 
 static silt_status info_out(const char *out, FILE *to, silt_error *err) {
-    char *path = silt_text("%s/summary.json", out), *history = silt_text("%s/history.csv", out);
+    char *history = silt_text("%s/history.csv", out);
     struct stat file;
     struct fy_document *summary = NULL;
     silt_status status = SILT_OK;
@@ -170,8 +184,7 @@ static silt_status info_out(const char *out, FILE *to, silt_error *err) {
         status = silt_fail(err, SILT_INPUT, "%s: no output of a run stands there, history.csv is absent", out);
         goto done;
     }
-    if (stat(path, &file) == 0)
-        summary = fy_document_build_from_file(&(struct fy_parse_cfg){.flags = FYPCF_QUIET | FYPCF_JSON_AUTO}, path);
+    summary = silt_summary_open(out);
     if (summary) {
         info_summary(summary, to);
     } else {
@@ -190,9 +203,8 @@ static silt_status info_out(const char *out, FILE *to, silt_error *err) {
         free(checkpoint);
     }
 done:
-    fy_document_destroy(summary);
+    silt_summary_close(summary);
     free(history);
-    free(path);
     return status;
 }
 
@@ -204,7 +216,7 @@ silt_status silt_info(const char *path, FILE *to, silt_error *err) {
         return info_out(path, to, err);
     silt_scene *scene = NULL;
     SILT_TRY(silt_scene_read(path, 0, NULL, &scene, err));
-    info_scene(scene, to);
+    silt_info_scene(scene, to);
     silt_scene_free(&scene);
     return SILT_OK;
 }

@@ -73,9 +73,15 @@ silt_status silt_history_create(silt_history **history, const char *out, const s
 /** opens an existing history.csv, cuts rows with step > last away, goes on behind it */
 silt_status silt_history_reopen(silt_history **history, const char *out, const silt_scene *scene, int64_t last, silt_error *err);
 silt_status silt_history_row(silt_history *history, const silt_view *view, const double *gauge, silt_error *err);
+/** a column of the row that the view has, by its name; NaN where there is no such column */
+double silt_history_value(silt_history *history, const silt_view *view, const double *gauge, const char *column);
 /** forces the rows to the disk; before a checkpoint is committed, so that no checkpoint is ahead of its history */
 silt_status silt_history_sync(silt_history *history, silt_error *err);
 silt_status silt_history_close(silt_history **history, silt_error *err);
+
+/** index of a name in the header line, -1: absent; the number of a row in that column, NaN: none (verify.c) */
+int silt_history_find(const char *header, const char *name);
+double silt_history_number(const char *row, int column);
 
 // frame.c ------------------------------------------------------------------------------------------
 /** writes fluid_NNNNNN.hdf etc., the .series indices, run.h5 and a line of run.log */
@@ -118,6 +124,13 @@ typedef struct silt_summary {
     int64_t steps, retries, iterations, most_iterations;
 } silt_summary;
 silt_status silt_summary_write(const char *out, const silt_view *view, const silt_summary *summary, silt_error *err);
+struct fy_document; // of libfyaml
+/** OUT/summary.json; NULL: absent or broken */
+struct fy_document *silt_summary_open(const char *out);
+void silt_summary_close(struct fy_document *summary);
+/** a scalar of it by its path, "/phases/mesh/seconds"; "" and 0 where there is none */
+const char *silt_summary_text(struct fy_document *summary, const char *key);
+double silt_summary_number(struct fy_document *summary, const char *key);
 /** a text in quotes or null; a name with its number (NaN and infinity: null) and what follows it */
 void silt_json_text(FILE *to, const char *text);
 void silt_json_number(FILE *to, const char *name, double value, const char *end);
@@ -139,13 +152,40 @@ silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_ch
 /** Copies the files that the scene reads (references, series, surfaces, outlines, clouds) into OUT and writes OUT/scene.yaml: the resolved scene,
  * which names the copies, so that OUT can be verified, resumed and run again anywhere. */
 silt_status silt_verify_copy(const silt_scene *scene, const char *out, silt_error *err);
-/** Holds OUT against the checks of OUT/scene.yaml; prints a line a check to `to`. SILT_FAILED when one fails. */
-silt_status silt_verify(const char *out, FILE *to, silt_error *err);
-/** PNG pictures of frames: frame -1 all, -2 the last; field: mesh, pressure, speed, elevation, vorticity, porosity, bed (NULL:
- * speed); slice: "y=0.5" for a plane cut through three dimensions, NULL: none; written as TO/picture_NNNNNN.png (NULL: OUT) */
-silt_status silt_draw(const char *out, int frame, const char *field, const char *slice, const char *to, FILE *say,
-                      silt_error *err);
+/** what pictures are asked for; all zero: the last frame, coloured by speed, into OUT */
+typedef enum { DRAW_LAST = 0, DRAW_ALL, DRAW_ONE } silt_draw_frames;
+typedef struct silt_draw_def {
+    silt_draw_frames frames;
+    int frame;           // of DRAW_ONE
+    const char *field;   // mesh, pressure, speed, elevation, vorticity, porosity, bed; NULL: speed
+    const char *slice;   // "y=0.5": a plane cut through three dimensions; NULL: none
+    const char *without; // "water,grains": what is left out, of water, bed, grains, bodies, walls; NULL: nothing
+    const char *to;      // folder of the pictures; NULL: OUT
+    const char *film;    // all frames as this moving picture instead (draw_film.c); NULL: none
+} silt_draw_def;
+/** PNG pictures of frames, TO/picture_NNNNNN.png; say: a line a file, NULL: none */
+silt_status silt_draw(const char *out, const silt_draw_def *def, FILE *say, silt_error *err);
+
+// report.c -------------------------------------------------------------------------------------------
+typedef struct silt_report_def {
+    const char *path;    // of the page; NULL: OUT/report.html
+    silt_draw_def draw;  // field, slice and without of its pictures
+    double megabytes;    // of the view's frames; 0: 20
+} silt_report_def;
+/** One HTML page on a run that needs no network: what ran, pictures, a view to turn, checks, ledgers, times. It may be made while the
+ * run goes. say: what it lacks and where it is, NULL: nothing */
+silt_status silt_report(const char *out, const silt_report_def *def, FILE *say, silt_error *err);
+
+// pictures.c ------------------------------------------------------------------------------------------
+/** silt_draw and silt_report: a module has them, so that nothing else loads cairo */
+typedef struct silt_pictures {
+    silt_status (*draw)(const char *out, const silt_draw_def *def, FILE *say, silt_error *err);
+    silt_status (*report)(const char *out, const silt_report_def *def, FILE *say, silt_error *err);
+} silt_pictures;
+silt_status silt_pictures_load(const silt_pictures **pictures, silt_error *err);
 silt_status silt_info(const char *path, FILE *to, silt_error *err);
+/** the part of it about a scene */
+void silt_info_scene(const silt_scene *scene, FILE *to);
 /** warn.c: prints what is allowed but probably not meant, a line each; @return how many */
 int silt_scene_warn(const silt_scene *scene, FILE *to);
 

@@ -1,9 +1,12 @@
 // summary.json: what became of a run, and the progress line while it goes
 
 #include "output.h"
+#include "parallel.h"
 
 #include <errno.h>
 #include <sys/resource.h>
+#include <sys/utsname.h>
+#include <time.h>
 #include <unistd.h>
 
 static const char *const summary_phase[PHASE_COUNT] = {
@@ -58,6 +61,40 @@ static void summary_checks(FILE *to, const silt_scene *scene, const silt_check_r
     fputs(scene->n_check ? "\n  ]\n" : "]\n", to);
 }
 
+// the processor's name as the system tells it; empty where it does not. Owned by the caller
+static char *summary_processor(void) {
+    FILE *from = fopen("/proc/cpuinfo", "r");
+    char *line = NULL, *name = NULL;
+    size_t capacity = 0;
+    while (from && !name && getline(&line, &capacity, from) > 0)
+        if (strncmp(line, "model name", 10) == 0 && strchr(line, ':')) {
+            const char *text = strchr(line, ':') + 1;
+            text += strspn(text, " \t");
+            name = silt_text("%.*s", (int)strcspn(text, "\n"), text);
+        }
+    if (from)
+        fclose(from);
+    free(line);
+    return name ? name : silt_text("%s", "");
+}
+
+// on what this process ran, and when it wrote this
+static void summary_machine(FILE *to) {
+    char *processor = summary_processor(), ended[32];
+    const time_t now = time(NULL);
+    struct utsname system;
+    struct tm utc;
+    fputs("  \"machine\": {\"processor\": ", to);
+    silt_json_text(to, processor);
+    fprintf(to, ", \"processors\": %ld, \"threads\": %d, \"system\": ", sysconf(_SC_NPROCESSORS_ONLN), silt_threads_asked());
+    char *name = uname(&system) == 0 ? silt_text("%s %s %s", system.sysname, system.release, system.machine) : silt_text("%s", "");
+    silt_json_text(to, name);
+    strftime(ended, sizeof ended, "%Y-%m-%d %H:%M UTC", gmtime_r(&now, &utc));
+    fprintf(to, "},\n  \"ended\": \"%s\",\n", ended);
+    free(name);
+    free(processor);
+}
+
 static void summary_print(FILE *to, const silt_view *view, const silt_summary *summary,
                           const silt_check_result *check) {
     const silt_scene *scene = view->scene;
@@ -97,6 +134,7 @@ static void summary_print(FILE *to, const silt_view *view, const silt_summary *s
     silt_json_number(to, "worst_volume_error", summary->worst_volume_error, ",\n  ");
     silt_json_number(to, "worst_sediment_error", summary->worst_sediment_error, ",\n  ");
     silt_json_number(to, "worst_momentum_error", summary->worst_momentum_error, ",\n");
+    summary_machine(to);
     summary_checks(to, scene, check);
     fputs("}\n", to);
 }

@@ -26,7 +26,7 @@ static void history_clear(verify_history *history) {
 }
 
 // index of a name in the header line, -1: absent
-static int history_find(const char *header, const char *name) {
+int silt_history_find(const char *header, const char *name) {
     size_t length = strlen(name);
     for (int i = 0;; i++) {
         size_t field = strcspn(header, ",\r\n");
@@ -38,7 +38,7 @@ static int history_find(const char *header, const char *name) {
     }
 }
 
-static double history_number(const char *row, int column) {
+double silt_history_number(const char *row, int column) {
     for (; row && column > 0; column--)
         row = (row = strchr(row, ',')) ? row + 1 : NULL;
     char *end;
@@ -56,7 +56,7 @@ static silt_status history_read(verify_history *history, const silt_scene *scene
         status = silt_fail(err, SILT_FAILED, "%s: cannot be read (%s)", path, strerror(errno));
         goto done;
     }
-    int time = getline(&line, &capacity, from) > 0 ? history_find(line, "time") : -1;
+    int time = getline(&line, &capacity, from) > 0 ? silt_history_find(line, "time") : -1;
     if (time < 0) {
         status = silt_fail(err, SILT_FAILED, "%s: its first line has no column time", path);
         goto done;
@@ -64,15 +64,15 @@ static silt_status history_read(verify_history *history, const silt_scene *scene
     int n = scene->n_check;
     history->column = silt_alloc((size_t)n + 1, sizeof *history->column);
     for (int i = 0; i < n; i++)
-        history->column[i] = scene->check[i].column ? history_find(line, scene->check[i].column) : -1;
+        history->column[i] = scene->check[i].column ? silt_history_find(line, scene->check[i].column) : -1;
     // a last line without its end is what a killed run left, and does not count
     while ((length = getline(&line, &capacity, from)) > 0 && line[length - 1] == '\n') {
         int row = history->n_row++;
         SILT_RESERVE(history->time, history->time_capacity, row + 1);
         SILT_RESERVE(history->value, history->value_capacity, (row + 1) * n);
-        history->time[row] = history_number(line, time);
+        history->time[row] = silt_history_number(line, time);
         for (int i = 0; i < n; i++)
-            history->value[row * n + i] = history->column[i] < 0 ? NAN : history_number(line, history->column[i]);
+            history->value[row * n + i] = history->column[i] < 0 ? NAN : silt_history_number(line, history->column[i]);
     }
 done:
     if (from)
@@ -169,30 +169,29 @@ static bool verify_read(const silt_scene *scene, const char *out, verify_files *
     return !status;
 }
 
-// difference of the history, or of the profile, from the reference at the reference's abscissas
+// difference of the history, or of the profile, from the reference at the reference's abscissas; the caller clears the reference
 static void verify_curve_check(const silt_scene *scene, const char *out, verify_files *files, int check,
-                               silt_curve *history, silt_check_result *result) {
+                               silt_curve *history, silt_curve *reference, silt_check_result *result) {
     const silt_check_def *def = &scene->check[check];
-    silt_curve reference = {0};
-    if (!verify_read(scene, out, files, check, &reference, result))
-        goto done;
+    if (!verify_read(scene, out, files, check, reference, result))
+        return;
     if (def->kind == CHECK_PROFILE && !(def->profile == PROFILE_GRAINS ? silt_profile_grains : silt_profile_sample)(
-                                          scene, out, def, &reference, history, result->note))
-        goto done;
+                                          scene, out, def, reference, history, result->note))
+        return;
     if (def->kind != CHECK_PROFILE && !isnan(def->align)) {
-        double here = silt_curve_reaches(history, def->align), there = silt_curve_reaches(&reference, def->align);
+        double here = silt_curve_reaches(history, def->align), there = silt_curve_reaches(reference, def->align);
         if (isnan(here) || isnan(there)) {
             verify_note(result, "the %s never reaches %g, where both are to be aligned",
                         isnan(here) ? "result" : "reference", def->align);
-            goto done;
+            return;
         }
         for (int i = 0; i < history->n; i++)
             history->x[i] += there - here;
     }
     double sum = 0, mean = 0, worst = 0, last = history->n ? history->x[history->n - 1] : -HUGE_VAL;
     int n = 0, wanted = 0, late = 0;
-    for (int i = 0; i < reference.n; i++) {
-        double x = reference.x[i], r = reference.y[i];
+    for (int i = 0; i < reference->n; i++) {
+        double x = reference->x[i], r = reference->y[i];
         if (!inside(x, def->window) || !inside(r, def->window_value))
             continue;
         wanted++;
@@ -203,7 +202,7 @@ static void verify_curve_check(const silt_scene *scene, const char *out, verify_
         double scale = def->relative_to != 0 ? def->relative_to : r;
         if (scale == 0) {
             verify_note(result, "the reference is 0 at %g: give relative_to", x);
-            goto done;
+            return;
         }
         double e = fabs((h - r) / scale);
         sum += e * e;
@@ -224,8 +223,6 @@ static void verify_curve_check(const silt_scene *scene, const char *out, verify_
         result->pass = result->error <= def->tolerance;
         verify_note(result, n < wanted ? "%d of %d rows of the reference" : "%d rows of the reference", n, wanted);
     }
-done:
-    silt_curve_clear(&reference);
 }
 
 static void verify_scalar_check(const silt_check_def *def, const silt_curve *history, silt_check_result *result) {
@@ -276,7 +273,8 @@ done:
 
 // ---------------------------------------------------------------- all checks
 
-silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_check_result *result, silt_error *err) {
+silt_status silt_check_measure_seen(const silt_scene *scene, const char *out, silt_check_result *result,
+                                    const silt_check_watch *watch, silt_error *err) {
     verify_history history = {0};
     verify_files files = {0};
     free(silt_scene_named(scene, verify_name, &files));
@@ -295,7 +293,7 @@ silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_ch
         if (!profile && history.column[i] < 0)
             continue;
         result[i].note[0] = 0;
-        silt_curve curve = {0};
+        silt_curve curve = {0}, reference = {0};
         for (int k = 0; k < history.n_row && !profile; k++) {
             // gauges are NaN where they measure nothing: gaps in the curve
             double x = def->time_scale * (history.time[k] + def->time_shift);
@@ -303,14 +301,21 @@ silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_ch
                 silt_curve_add(&curve, x, def->scale * (history.value[k * scene->n_check + i] + def->shift));
         }
         if (def->reference)
-            verify_curve_check(scene, out, &files, i, &curve, &result[i]);
+            verify_curve_check(scene, out, &files, i, &curve, &reference, &result[i]);
         else
             verify_scalar_check(def, &curve, &result[i]);
+        if (watch)
+            watch->see(watch->self, i, &curve, def->reference ? &reference : NULL);
         silt_curve_clear(&curve);
+        silt_curve_clear(&reference);
     }
     history_clear(&history);
     verify_files_clear(&files);
     return status;
+}
+
+silt_status silt_check_measure(const silt_scene *scene, const char *out, silt_check_result *result, silt_error *err) {
+    return silt_check_measure_seen(scene, out, result, NULL, err);
 }
 
 static silt_status verify_copy_file(const char *from, const char *to, silt_error *err) {

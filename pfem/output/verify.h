@@ -31,4 +31,13 @@ bool silt_profile_sample(const silt_scene *scene, const char *out, const silt_ch
 bool silt_profile_grains(const silt_scene *scene, const char *out, const silt_check_def *def, const silt_curve *reference,
                          silt_curve *profile, char *note);
 
+/** What a check compared, told while it is measured: the result over its scaled abscissa, and the rows that it is held against. */
+typedef struct silt_check_watch {
+    void (*see)(void *self, int check, const silt_curve *result, const silt_curve *reference); // reference NULL: a scalar
+    void *self;
+} silt_check_watch;
+/** silt_check_measure, with somebody who looks on (NULL: nobody) */
+silt_status silt_check_measure_seen(const silt_scene *scene, const char *out, silt_check_result *result,
+                                    const silt_check_watch *watch, silt_error *err);
+
 #endif

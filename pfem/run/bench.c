@@ -1,5 +1,4 @@
 // silt bench: the time loop's own steps, timed by its own clocks; every scene and size in a process of its own
-#include <dirent.h>
 #include <errno.h>
 #include <malloc.h>
 #include <signal.h>
@@ -153,6 +152,7 @@ static silt_status measure_steps(silt_run *run, bench_row *row, silt_error *err)
         row->phase[c] = median(n, &s->phase[c], SAMPLE_LENGTH) / row->nodes;
         row->step += row->phase[c];
     }
+    row->coupling = row->grains > 0 ? MEAN(n, s, phase[CLOCK_coupling]) / row->grains : 0;
     row->unit = median(n, &s->unit, SAMPLE_LENGTH) / row->nodes;
     for (int k = 0; k < n; k++) {
         ratio[k] = s[k].total / s[k].unit;
@@ -225,16 +225,6 @@ static silt_status measure_run(silt_run *run, double started, bench_row *row, si
 }
 
 // ---------------------------------------------------------------- a scene at a size
-
-static void folder_remove(const char *path) {
-    DIR *folder = opendir(path);
-    for (struct dirent *entry; folder && (entry = readdir(folder));)
-        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
-            unlinkat(dirfd(folder), entry->d_name, 0);
-    if (folder)
-        closedir(folder);
-    rmdir(path);
-}
 
 static silt_status row_measure(const silt_bench_def *def, const char *folder, bench_row *row, silt_error *err) {
     const bench_scene *kind = bench_scene_find(row->name);
@@ -318,7 +308,7 @@ static silt_status row_fork(const silt_bench_def *def, bench_row *row, silt_erro
     for (int k = 0; k < 2; k++)
         if (ends[k] >= 0)
             close(ends[k]);
-    folder_remove(folder);
+    silt_folder_remove(folder);
     free(folder);
     free(answer);
     return status;

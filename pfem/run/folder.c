@@ -1,4 +1,6 @@
 // the output folder: made, locked, cleared of an earlier run; and where the worker is found
+#define _GNU_SOURCE // dladdr
+#include <dlfcn.h>
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -37,7 +39,8 @@ static void out_clear(const char *out) {
                                        "run.h5",
                                        "*.hdf.series",
                                        "*_[0-9][0-9][0-9][0-9][0-9][0-9].hdf",
-                                       "picture_*.png"};
+                                       "picture_*.png",
+                                       "report.html"};
     DIR *folder = opendir(out);
     for (struct dirent *entry; folder && (entry = readdir(folder));)
         for (size_t k = 0; k < sizeof ours / sizeof *ours; k++) {
@@ -79,25 +82,38 @@ char *silt_folder_default(const silt_scene *scene) {
 }
 
 // silt-dem stands beside the program, or in libexec of the installed tree
+// the first that can be run of what lies near a file, in the build tree or installed; else where it should be
+static char *worker_near(const char *file) {
+    static const char *const place[] = {"silt-dem", "../silt-dem", "../libexec/silt/silt-dem", "../../libexec/silt/silt-dem"};
+    const char *slash = strrchr(file, '/');
+    for (size_t k = 0; slash && k < sizeof place / sizeof *place; k++) {
+        char *path = silt_text("%.*s/%s", (int)(slash - file), file, place[k]);
+        if (access(path, X_OK) == 0)
+            return path;
+        free(path);
+    }
+    return slash ? silt_text("%.*s/silt-dem", (int)(slash - file), file) : silt_text("silt-dem");
+}
+
 char *silt_worker_find(const char *asked) {
     if (asked)
         return silt_text("%s", asked);
+    // beside libsilt, where another program has loaded silt as that; else beside the program
+    Dl_info library;
+    if (dladdr(__func__, &library) && library.dli_fname && strstr(library.dli_fname, "/libsilt.so"))
+        return worker_near(library.dli_fname);
     char self[4096];
     const ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-    if (n <= 0)
-        return silt_text("silt-dem");
-    self[n] = 0;
-    char *slash = strrchr(self, '/');
-    *slash = 0;
-    for (int k = 0; k < 3; k++) {
-        char path[4200];
-        snprintf(path, sizeof path,
-                 k == 0   ? "%s/silt-dem"
-                 : k == 1 ? "%s/../silt-dem"
-                          : "%s/../libexec/silt/silt-dem",
-                 self);
-        if (access(path, X_OK) == 0)
-            return silt_text("%s", path);
-    }
-    return silt_text("%s/silt-dem", self);
+    self[n > 0 ? n : 0] = 0;
+    return worker_near(self);
+}
+
+void silt_folder_remove(const char *path) {
+    DIR *folder = opendir(path);
+    for (struct dirent *entry; folder && (entry = readdir(folder));)
+        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
+            unlinkat(dirfd(folder), entry->d_name, 0);
+    if (folder)
+        closedir(folder);
+    rmdir(path);
 }

@@ -32,7 +32,7 @@ silt_status silt_run_loads_sane(const silt_run *run, silt_error *err) {
     for (int b = 0; bodies && b < bodies->count; b++) {
         const struct silt_body *body = &bodies->body[b];
         double force[2], torque, reach = 0;
-        if (scene->body[b].motion == MOTION_FIXED || !water_on_body(run, b, force, &torque))
+        if (scene->body[b].motion != MOTION_FREE || !water_on_body(run, b, force, &torque))
             continue;
         for (int k = 0; k < body->n_point; k++)
             reach = silt_max(reach, hypot(body->point[2 * k], body->point[2 * k + 1]));
@@ -69,7 +69,9 @@ static void load_bodies(silt_run *run, double before, bool again) {
             reach = silt_max(reach, hypot(body->point[2 * k], body->point[2 * k + 1]));
         // added mass and inertia: those of the disc around it
         const double added = rho * M_PI * silt_square(reach), turned = 0.25 * added * silt_square(reach);
-        const double share = most / (1 + ratio * added / body->mass), twist = most / (1 + ratio * turned / body->inertia[2]);
+        const bool moved = run->scene->body[b].motion == MOTION_PRESCRIBED; // the load does nothing to it
+        const double share = moved ? 1 : most / (1 + ratio * added / body->mass);
+        const double twist = moved ? 1 : most / (1 + ratio * turned / body->inertia[2]);
         for (int d = 0; d < 2; d++)
             body->force[d] = wet ? body->force[d] + share * (force[d] - body->force[d]) : 0;
         body->torque[2] = wet ? body->torque[2] + twist * (torque - body->torque[2]) : 0;

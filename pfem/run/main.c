@@ -1,6 +1,7 @@
 // the command line: silt COMMAND ...; prints what the library reports and turns its status into the exit code
 
 #include "bench.h"
+#include "study.h"
 
 #include <argp.h>
 #include <errno.h>
@@ -18,8 +19,8 @@ typedef struct main_arguments {
     silt_run_def run;
     int steps, warm_up; // of bench
     const char *sizes;
-    int frame; // -1 all, -2 the last
-    const char *field, *slice, *to;
+    silt_draw_def draw;
+    silt_study_def study;
 } main_arguments;
 
 typedef struct main_command {
@@ -32,11 +33,12 @@ typedef struct main_command {
 // ---------------------------------------------------------------- options
 
 enum { OPTION_UNTIL = 'u', OPTION_THREADS = 't', OPTION_FORCE = 'f', OPTION_FRAME = 'n', OPTION_FIELD = 'c', OPTION_SLICE = 'l',
-       OPTION_SIZES = 's', OPTION_STEPS = 'p', OPTION_WARM_UP = 'm' };
+       OPTION_SIZES = 's', OPTION_STEPS = 'p', OPTION_WARM_UP = 'm', OPTION_PLAN = 'a', OPTION_COLLECT = 'g', OPTION_JOB = 'r',
+       OPTION_WITHOUT = 'x', OPTION_FILM = 'i' };
 #define LONG_ONLY(key) ((key) + 256)
 
 static const struct argp_option main_options[] = {
-    {"output", 'o', "OUT", 0, "output folder; default: the scene's folder name plus .out in the current folder (bench: JSON file; default: none)", 0},
+    {"output", 'o', "OUT", 0, "output folder; default: the scene's folder name plus .out in the current folder (bench: JSON file, default: none; report: the page, default: OUT/report.html; study: its results, default: its name plus .study)", 0},
     {NULL, 'D', "KEY=VALUE", 0, "set a key of the scene, for example fluid.size=0.01 or bodies.temple.density=700", 0},
     {"until", LONG_ONLY(OPTION_UNTIL), "T", 0, "run to this time in s instead of the scene's time.end", 0},
     {"threads", LONG_ONLY(OPTION_THREADS), "N", 0, "threads; default: all, or OMP_NUM_THREADS; the results are the same bits (bench: one; with more, every other step is done on one)", 0},
@@ -46,9 +48,15 @@ static const struct argp_option main_options[] = {
     {"frame", LONG_ONLY(OPTION_FRAME), "N|all", 0, "the frame to draw; default: the last", 0},
     {"field", LONG_ONLY(OPTION_FIELD), "NAME", 0, "speed (default), pressure, elevation, vorticity, porosity, mesh or bed", 0},
     {"slice", LONG_ONLY(OPTION_SLICE), "PLANE", 0, "a cut through three dimensions, for example y=0.5", 0},
+    {"without", LONG_ONLY(OPTION_WITHOUT), "PARTS", 0, "leave out water, bed, grains, bodies or walls; several with commas between", 0},
+    {"film", LONG_ONLY(OPTION_FILM), "FILE", 0, "all frames as a moving picture: FILE.mp4, .webm, .webp or .gif (made by ffmpeg)", 0},
     {"sizes", LONG_ONLY(OPTION_SIZES), "LIST", 0, "nodes, for example 10k,40k; of a collapse N, for example 20,40", 0},
     {"steps", LONG_ONLY(OPTION_STEPS), "N", 0, "steps that are measured; default: 9", 0},
     {"warm-up", LONG_ONLY(OPTION_WARM_UP), "N", 0, "steps before those; default: 6", 0},
+    {"jobs", 'j', "N", 0, "runs at the same time; default: 1", 0},
+    {"plan", LONG_ONLY(OPTION_PLAN), NULL, 0, "print a command a line, for GNU parallel or an array of Slurm, and run nothing", 0},
+    {"run", LONG_ONLY(OPTION_JOB), "N", 0, "do point N of the study alone, as the lines of --plan do", 0},
+    {"collect", LONG_ONLY(OPTION_COLLECT), NULL, 0, "gather what has been run into study.csv, plots and study.md", 0},
     {"to", LONG_ONLY('d'), "FOLDER", 0, "where the pictures go; default: OUT", 0},
 };
 enum { N_OPTION = sizeof main_options / sizeof main_options[0] };
@@ -92,15 +100,16 @@ static error_t main_option(int key, char *text, struct argp_state *state) {
         a->run.worker = text;
         return 0;
     case LONG_ONLY(OPTION_FRAME):
-        a->frame = strcmp(text, "all") == 0 ? -1 : (int)strtol(text, &end, 10);
-        if (a->frame < -1 || (a->frame >= 0 && (end == text || *end)))
+        a->draw.frames = strcmp(text, "all") == 0 ? DRAW_ALL : DRAW_ONE;
+        a->draw.frame = a->draw.frames == DRAW_ONE ? (int)strtol(text, &end, 10) : 0;
+        if (a->draw.frames == DRAW_ONE && (a->draw.frame < 0 || end == text || *end))
             argp_error(state, "--frame %s: a frame's number or all is needed", text);
         return 0;
     case LONG_ONLY(OPTION_FIELD):
-        a->field = text;
+        a->draw.field = text;
         return 0;
     case LONG_ONLY(OPTION_SLICE):
-        a->slice = text;
+        a->draw.slice = text;
         return 0;
     case LONG_ONLY(OPTION_SIZES):
         a->sizes = text;
@@ -111,8 +120,26 @@ static error_t main_option(int key, char *text, struct argp_state *state) {
     case LONG_ONLY(OPTION_WARM_UP):
         a->warm_up = (int)main_number(state, "--warm-up", text, true);
         return 0;
+    case LONG_ONLY(OPTION_WITHOUT):
+        a->draw.without = text;
+        return 0;
+    case LONG_ONLY(OPTION_FILM):
+        a->draw.film = text;
+        return 0;
     case LONG_ONLY('d'):
-        a->to = text;
+        a->draw.to = text;
+        return 0;
+    case 'j':
+        a->study.jobs = (int)main_number(state, "-j", text, true);
+        return 0;
+    case LONG_ONLY(OPTION_PLAN):
+        a->study.plan = true;
+        return 0;
+    case LONG_ONLY(OPTION_COLLECT):
+        a->study.collect = true;
+        return 0;
+    case LONG_ONLY(OPTION_JOB):
+        a->study.only = (int)main_number(state, "--run", text, true);
         return 0;
     case ARGP_KEY_ARG:
         if (a->path)
@@ -173,9 +200,19 @@ static silt_status main_verify(const main_arguments *a, silt_error *err) {
 
 static silt_status main_draw(const main_arguments *a, silt_error *err) {
     SILT_TRY(main_out(a, err));
-    if (a->to && mkdir(a->to, 0777) != 0 && errno != EEXIST)
-        return silt_fail(err, SILT_FAILED, "%s: cannot be made (%s)", a->to, strerror(errno));
-    return silt_draw(a->path, a->frame, a->field, a->slice, a->to, stdout, err);
+    if (a->draw.to && mkdir(a->draw.to, 0777) != 0 && errno != EEXIST)
+        return silt_fail(err, SILT_FAILED, "%s: cannot be made (%s)", a->draw.to, strerror(errno));
+    const silt_pictures *pictures;
+    SILT_TRY(silt_pictures_load(&pictures, err));
+    return pictures->draw(a->path, &a->draw, stdout, err);
+}
+
+static silt_status main_report(const main_arguments *a, silt_error *err) {
+    SILT_TRY(main_out(a, err));
+    const silt_report_def def = {.path = a->run.out, .draw = a->draw};
+    const silt_pictures *pictures;
+    SILT_TRY(silt_pictures_load(&pictures, err));
+    return pictures->report(a->path, &def, stdout, err);
 }
 
 static silt_status main_info(const main_arguments *a, silt_error *err) {
@@ -189,6 +226,18 @@ static silt_status main_bench(const main_arguments *a, silt_error *err) {
     return silt_bench(&def, stdout, err);
 }
 
+static silt_status main_study(const main_arguments *a, silt_error *err) {
+    silt_study_def def = a->study;
+    def.path = a->path;
+    def.out = a->run.out;
+    def.force = a->run.force;
+    def.quiet = a->run.quiet;
+    def.worker = a->run.worker;
+    def.n_set = a->n_set;
+    def.set = a->set;
+    return silt_study(&def, stdout, err);
+}
+
 static silt_status main_help(const main_arguments *a, silt_error *err);
 
 static const main_command main_commands[] = {
@@ -197,10 +246,13 @@ static const main_command main_commands[] = {
     {"resume", "OUT", "Goes on from the newest whole checkpoint in OUT; with --until also a finished run.", "utqw",
      main_resume},
     {"verify", "OUT", "Holds the results in OUT against the checks of the scene, a line per check.", "", main_verify},
-    {"draw", "OUT", "Draws frames of a run as PNG pictures.", "ncdl", main_draw},
+    {"draw", "OUT", "Draws frames of a run as PNG pictures, or all of them as a film.", "ncdlxi", main_draw},
+    {"report", "OUT", "Makes one HTML page of a run: pictures, a view to turn, checks, ledgers, times.", "oclx", main_report},
     {"info", "OUT|SCENE", "Tells what a scene asks for, or what stands in an output folder.", "", main_info},
     {"bench", "[SCENES]", "Measures what steps cost, phase by phase, in scenes of its own or in files (commas between).", "oDtqwspm",
      main_bench},
+    {"study", "STUDY", "Runs a scene over ranges of its keys: errors, times, what becomes of it at extremes; finished runs are kept.",
+     "oDjagrqfw", main_study},
     {"help", "[KEY|COMMAND]", "Explains the keys of a scene: all of them, a block, or one, for example fluid.size; or a command.",
      "", main_help},
 };
@@ -239,6 +291,10 @@ static void main_explain(const main_command *command) {
         printf("%s  %-12s %s (%s)\n", k ? "" : "\nScenes and their sizes:\n", list[k].name, list[k].document, list[k].sizes);
     if (n)
         puts("\ndocs/performance.md explains the table.");
+    if (command->run == main_study) {
+        puts("\nKeys of a study (silt help study.KEY tells more, docs/study.md all):\n");
+        silt_study_help(NULL, stdout, NULL);
+    }
 }
 
 static silt_status main_help(const main_arguments *a, silt_error *err) {
@@ -247,6 +303,8 @@ static silt_status main_help(const main_arguments *a, silt_error *err) {
             main_explain(&main_commands[i]);
             return SILT_OK;
         }
+    if (a->path && strncmp(a->path, "study.", 6) == 0)
+        return silt_study_help(a->path + 6, stdout, err);
     return silt_scene_help(a->path, stdout, err);
 }
 
@@ -272,7 +330,7 @@ static void main_calm(char **argv) {
 
 int main(int argc, char **argv) {
     silt_memory_settle();
-    main_arguments a = {.frame = -2};
+    main_arguments a = {0};
     silt_error err = {0};
     const char *word = argc > 1 ? argv[1] : "";
     if (strcmp(word, "--version") == 0 || strcmp(word, "-V") == 0) {

@@ -1,21 +1,11 @@
-// the time loop, and what stands before and after it
-#include <signal.h>
+// a step in time, and what is shown of it
 #include <unistd.h>
 
 #include "bed_law.h"
-#include "parallel.h"
 #include "run.h"
 
 #define BED_Y_PLUS 5.0     // largest height of the first cell in wall units: the viscous sublayer
 #define PRESSURE_SLOPE 0.2 // largest share by which output carries the pressure on to the end of the step
-
-static volatile sig_atomic_t run_asked, run_stop; // a signal asked for a checkpoint; SIGTERM came
-
-static void on_signal(int number) {
-    run_asked = 1;
-    if (number == SIGTERM)
-        run_stop = 1;
-}
 
 // what history and summary tell of the clocks; `rest` is none of them
 #define PHASE_NONE PHASE_COUNT
@@ -38,7 +28,7 @@ static void run_phases(silt_run *run) {
             run->phase[run_phase[c]] += seconds[c];
 }
 
-static void run_view(silt_run *run, silt_view *view) {
+void silt_run_view(silt_run *run, silt_view *view) {
     const silt_scene *scene = run->scene;
     *view = (silt_view){.scene = scene, .ledger = &run->ledger, .step = run->step, .time = run->time, .dt = run->dt};
     if (scene->fluid.on) {
@@ -187,7 +177,9 @@ static silt_status step_sane(const silt_run *run, double wanted, silt_error *err
         return SILT_OK;
     const int D = silt_nodes_dim(nodes);
     const double g = silt_length(3, scene->gravity);
-    const double usual = silt_min(scene->time.output, g > 0 ? scene->time.cfl * sqrt(scene->fluid.size / g) : HUGE_VAL);
+    double usual = silt_min(scene->time.output, g > 0 ? scene->time.cfl * sqrt(scene->fluid.size / g) : HUGE_VAL);
+    if (scene->time.step > 0)
+        usual = silt_min(usual, scene->time.step); // short steps that were asked for are no sign of trouble
     if (wanted < 1e-7 * usual) {
         int k = 0;
         for (int i = 0; i < nodes->count; i++)
@@ -344,7 +336,7 @@ static void pressure_show(silt_run *run) {
 }
 
 // porosity at the new places, for the ledger and the frames
-static silt_status step_close(silt_run *run, silt_error *err) {
+silt_status silt_run_measure(silt_run *run, silt_error *err) {
     silt_status status = SILT_OK;
     if (run->coupling && run->scene->fluid.on)
         SILT_CLOCKED(coupling,
@@ -356,13 +348,13 @@ static silt_status step_close(silt_run *run, silt_error *err) {
     return SILT_OK;
 }
 
-static silt_status step_output(silt_run *run, silt_error *err) {
+silt_status silt_run_output(silt_run *run, silt_error *err) {
     // a row cannot hold the time that writing it takes: it shows that of the row before
     run_phases(run);
     run->phase[PHASE_output] = run->output_seconds;
     silt_clock_to(CLOCK_output);
     silt_view view;
-    run_view(run, &view);
+    silt_run_view(run, &view);
     silt_gauges_read(run->gauges, &view, run->gauge);
     SILT_TRY(silt_history_row(run->history, &view, run->gauge, err));
     if (run->tick == 0 && run->offset == 0)
@@ -382,37 +374,10 @@ static silt_status step_output(silt_run *run, silt_error *err) {
     return SILT_OK;
 }
 
-static silt_status checkpoint_write(silt_run *run, silt_error *err) {
-    if (run->saved_step == run->step)
-        return SILT_OK;
-    // the history must reach the disk first: a checkpoint is never ahead of it
-    silt_status status = silt_history_sync(run->history, err);
-    char *path = silt_text("%s/checkpoint-%c.h5", run->out, 'a' + run->checkpoint_slot);
-    if (status == SILT_OK)
-        status = silt_run_save(run, path, err);
-    free(path);
-    run->whole = status == SILT_OK;
-    if (status == SILT_OK) {
-        run->checkpoint_slot = 1 - run->checkpoint_slot;
-        run->saved_step = run->step;
-        run->saved_time = run->time;
-    }
-    return status;
-}
-
-// a run that fails tells where it can be taken up again; when only the next step failed, that is where it stands
-static void run_failed(silt_run *run, silt_error *err) {
-    silt_error late = {0};
-    if (run->whole)
-        checkpoint_write(run, &late);
-    if (!err)
-        return;
-    const size_t used = strlen(err->text), room = sizeof err->text - used;
-    if (late.count)
-        snprintf(err->text + used, room, "\nno checkpoint of this state: %s", late.text);
-    else if (run->saved_step >= 0)
-        snprintf(err->text + used, room, "\nthe last checkpoint is of step %lld, t = %.9g s; go on from it with: silt resume %s",
-                 (long long)run->saved_step, run->saved_time, run->out);
+silt_status silt_run_advance(silt_run *run, silt_error *err) {
+    SILT_TRY(run_step(run, err));
+    SILT_TRY(silt_run_measure(run, err));
+    return silt_run_output(run, err);
 }
 
 // ---------------------------------------------------------------- open and close
@@ -457,225 +422,4 @@ void silt_run_free(silt_run *run) {
     free(run->out);
     free(run->worker);
     free(run->log);
-}
-
-static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock,
-                             silt_error *err) {
-    *run = (silt_run){.scene = scene, .def = *def, .saved_step = -1, .lock = lock, .n_shown = -1};
-    run->out = silt_text("%s", out);
-    run->log = silt_text("%s/dem.log", out);
-    run->worker = silt_worker_find(def->worker);
-    run->started = silt_seconds();
-    silt_clock_reset();
-    run->summary.status = "running";
-    silt_threads_ask(def->threads);
-    run->nodes.dim = run->mesh.dim = scene->dimension;
-    run->mesh.period[0] = scene->period[1] - scene->period[0];
-    run->gauge = silt_alloc((size_t)silt_gauges_count(scene) + 1, sizeof *run->gauge);
-    run->wall_force = silt_alloc((size_t)scene->n_wall + 1, sizeof *run->wall_force);
-    SILT_TRY(silt_walls_create(&run->walls, scene, err));
-    silt_run_box(run);
-    return SILT_OK;
-}
-
-// ---------------------------------------------------------------- the loop
-
-silt_status silt_run_advance(silt_run *run, silt_error *err) {
-    SILT_TRY(run_step(run, err));
-    SILT_TRY(step_close(run, err));
-    return step_output(run, err);
-}
-
-static double run_end(const silt_run *run) { return run->def.until > 0 ? run->def.until : run->scene->time.end; }
-
-static silt_status run_loop(silt_run *run, silt_error *err) {
-    const silt_scene *scene = run->scene;
-    const double end = run_end(run);
-    const double every = scene->time.checkpoint > 0 ? scene->time.checkpoint : 10 * scene->time.output;
-    const int64_t frames_between = (int64_t)silt_max(1, floor(every / scene->time.output + 0.5));
-    silt_status status = SILT_OK;
-    silt_view view;
-
-    while (run->time < end * (1 - 1e-12) && (scene->time.steps == 0 || run->step < scene->time.steps)) {
-        status = silt_run_advance(run, err);
-        if (status != SILT_OK)
-            break;
-        const bool frame = run->tick == 0 && run->offset == 0;
-        if (run_asked && silt_run_set_up_due(run)) {
-            run_asked = 0;
-            status = checkpoint_write(run, err);
-            if (status == SILT_OK && run_stop)
-                status = silt_fail(err, SILT_STOPPED, "stopped by a signal at t = %.9g s; a checkpoint is written, go on with: silt resume %s",
-                                   run->time, run->out);
-        } else if (frame && run->frame % frames_between == 0)
-            status = checkpoint_write(run, err);
-        if (status != SILT_OK)
-            break;
-        run_view(run, &view);
-        if (!run->def.quiet)
-            silt_progress(&view, end, silt_seconds() - run->started, false);
-    }
-    // the end of a run is a place to go on from too
-    return status == SILT_OK ? checkpoint_write(run, err) : status;
-}
-
-// summary and history are closed whatever happened; the first error is the one that is told
-static silt_status run_close(silt_run *run, silt_status status, silt_error *err) {
-    silt_view view;
-    if (status == SILT_FAILED)
-        run_failed(run, err);
-    run->summary.status = status == SILT_OK ? "done" : status == SILT_STOPPED ? "stopped" : "failed";
-    run->summary.message = status == SILT_OK || !err ? NULL : err->text;
-    run->summary.seconds = silt_seconds() - run->started;
-    run_view(run, &view);
-    if (!run->def.quiet && run->history)
-        silt_progress(&view, run_end(run), run->summary.seconds, true);
-    silt_error late = {0};
-    silt_status closed = silt_history_close(&run->history, &late);
-    if (closed == SILT_OK)
-        closed = silt_summary_write(run->out, &view, &run->summary, &late);
-    if (status == SILT_OK && closed != SILT_OK) {
-        status = closed;
-        if (err)
-            *err = late;
-    }
-    silt_run_free(run);
-    return status;
-}
-
-static void signals_catch(void) {
-    struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGTERM, &action, NULL);
-    sigaction(SIGUSR1, &action, NULL);
-    run_asked = run_stop = 0;
-}
-
-// the state at t = 0 with its row and frame
-static silt_status run_start(silt_run *run, silt_error *err) {
-    silt_view view;
-    SILT_TRY(silt_verify_copy(run->scene, run->out, err));
-    SILT_TRY(silt_run_first(run, err));
-    SILT_TRY(step_close(run, err));
-    run_view(run, &view);
-    SILT_TRY(silt_gauges_create(&run->gauges, &view, err));
-    SILT_TRY(silt_history_create(&run->history, run->out, run->scene, err));
-    return step_output(run, err);
-}
-
-silt_status silt_run_open(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock,
-                          silt_error *err) {
-    SILT_TRY(run_begin(run, scene, def, out, lock, err));
-    return run_start(run, err);
-}
-
-silt_status silt_scene_run(const silt_scene *scene, const silt_run_def *def, silt_error *err) {
-    silt_run run;
-    int lock = -1;
-    char *out = def->out ? silt_text("%s", def->out) : silt_folder_default(scene);
-    silt_status status = silt_folder_prepare(out, def->force, &lock, err);
-    if (status == SILT_OK) {
-        signals_catch();
-        status = silt_run_open(&run, scene, def, out, lock, err);
-        if (status == SILT_OK)
-            status = run_loop(&run, err);
-        status = run_close(&run, status, err);
-    }
-    free(out);
-    return status;
-}
-
-// the step of one of the two checkpoints, -1 when it cannot be read
-static int64_t checkpoint_step(const char *path, silt_error *err) {
-    silt_store *store = NULL;
-    int64_t step = -1;
-    if (silt_store_open(&store, path, err) != SILT_OK || silt_store_take(store, "run/step", STORE_LONG, 1, &step, err) != SILT_OK)
-        step = -1;
-    silt_store_close(&store);
-    return step;
-}
-
-// a line in the log: where the run went on, and what was wrong with a checkpoint that was passed over
-static void resume_log(const silt_run *run, const char *path, const char *other, const char *why) {
-    char *log = silt_text("%s/run.log", run->out);
-    FILE *to = fopen(log, "a");
-    if (to) {
-        fprintf(to, "resumed at step %lld, time %.9g from %s", (long long)run->step, run->time, strrchr(path, '/') + 1);
-        fprintf(to, *why && access(other, F_OK) == 0 ? "; passed over: %s\n" : "\n", why);
-        fclose(to);
-    }
-    free(log);
-}
-
-// the newest of the two checkpoints that can be read whole
-static silt_status resume_load(silt_run *run, const silt_scene *scene, const silt_run_def *def, int lock, silt_error *err) {
-    char *path[2];
-    int64_t step[2];
-    silt_error why[2] = {{0}};
-    silt_status status = SILT_FAILED;
-    for (int k = 0; k < 2; k++) {
-        path[k] = silt_text("%s/checkpoint-%c.h5", def->out, 'a' + k);
-        step[k] = checkpoint_step(path[k], &why[k]);
-    }
-    for (int turn = 0; turn < 2 && status != SILT_OK; turn++) {
-        const int k = step[1] > step[0];
-        if (step[k] < 0)
-            break;
-        silt_store *store = NULL;
-        status = run_begin(run, scene, def, def->out, -1, &why[k]);
-        if (status == SILT_OK)
-            status = silt_store_open(&store, path[k], &why[k]);
-        if (status == SILT_OK)
-            status = silt_run_load(run, store, &why[k]);
-        if (status == SILT_OK)
-            silt_walls_move(&run->walls, scene, run->time, 0);
-        silt_store_close(&store);
-        if (status != SILT_OK) {
-            silt_run_free(run);
-            step[k] = -1;
-            continue;
-        }
-        run->checkpoint_slot = 1 - k;
-        run->saved_step = run->step;
-        run->saved_time = run->time;
-        run->whole = true;
-        run->lock = lock;
-        resume_log(run, path[k], path[1 - k], why[1 - k].text);
-    }
-    if (status != SILT_OK)
-        silt_fail(err, SILT_FAILED, "%s: no checkpoint to go on from: %s; %s", def->out, why[0].text, why[1].text);
-    free(path[0]);
-    free(path[1]);
-    return status;
-}
-
-silt_status silt_run_resume(const silt_run_def *def, silt_error *err) {
-    char *path = silt_text("%s/scene.yaml", def->out);
-    silt_scene *scene = NULL;
-    silt_run run;
-    int lock = -1;
-    silt_status status = silt_scene_read(path, 0, NULL, &scene, err);
-    free(path);
-    if (status != SILT_OK)
-        return status;
-    signals_catch();
-    status = silt_folder_lock(def->out, &lock, err);
-    if (status == SILT_OK)
-        status = resume_load(&run, scene, def, lock, err);
-    if (status != SILT_OK) {
-        if (lock >= 0)
-            close(lock);
-        goto done;
-    }
-    status = silt_frame_cut(run.out, (int)run.frame, err);
-    if (status == SILT_OK)
-        status = silt_history_reopen(&run.history, run.out, scene, run.step, err);
-    if (status != SILT_OK) {
-        silt_run_free(&run); // what the folder says of the run before stays
-        goto done;
-    }
-    status = run_close(&run, run_loop(&run, err), err);
-done:
-    silt_scene_free(&scene);
-    return status;
 }

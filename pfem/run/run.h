@@ -1,5 +1,5 @@
 /** @file run.h
- * The mutable run: all that happens, in the order of the flow. Only run.c, move.c, sediment.c and state.c see it whole.
+ * The mutable run: all that happens, in the order of the flow. Only the files of this room see it whole.
  */
 #ifndef SILT_RUN_H
 #define SILT_RUN_H
@@ -23,6 +23,7 @@ typedef struct silt_rest {
 
 struct silt_run {
     const silt_scene *scene;
+    silt_scene *scene_own; // owned, the same where a run was taken up again, else NULL
     silt_run_def def;
     char *out;        // owned
     char *worker;     // owned
@@ -102,12 +103,18 @@ struct silt_run {
     double way_lo[3], way_hi[3]; // what walls with a motion span from the start to the end
 };
 
-// run.c -----------------------------------------------------------------------------------------------
+// life.c ----------------------------------------------------------------------------------------------
 /** From nothing to the state at t = 0 with its row and frame in the folder `out`, which is there. To be freed also when it failed.
  * @param lock  see above */
 silt_status silt_run_open(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock, silt_error *err);
-/** One step of the time loop with its row, and its frame if it is due; its clocks are there to be read until the next one begins. */
-silt_status silt_run_advance(silt_run *run, silt_error *err);
+
+// run.c, besides silt_run_advance: clocks are there to be read until its next call --------------------
+/** what output sees of the run */
+void silt_run_view(silt_run *run, silt_view *view);
+/** porosity, ledger and pressure of a state, for row and frame */
+silt_status silt_run_measure(silt_run *run, silt_error *err);
+/** the state's row, and its frame if it is due */
+silt_status silt_run_output(silt_run *run, silt_error *err);
 void silt_run_free(silt_run *run);
 
 // grains.c --------------------------------------------------------------------------------------------
@@ -168,6 +175,7 @@ void silt_run_feed(silt_run *run, double dt); // what inlets bring in dt joins t
 silt_status silt_folder_prepare(const char *out, bool force, int *lock, silt_error *err);
 /** one run at a time in a folder; the lock ends with the process at the latest */
 silt_status silt_folder_lock(const char *out, int *lock, silt_error *err);
+void silt_folder_remove(const char *path); // the folder and the files in it
 char *silt_folder_default(const silt_scene *scene); // the scene's folder name plus .out, in the current folder; owned by the caller
 char *silt_worker_find(const char *asked);          // path of silt-dem; owned by the caller
 

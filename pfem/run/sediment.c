@@ -285,7 +285,8 @@ static bool water_calm(const silt_run *run, const double *x) {
 
 // A parcel at rest becomes bed: in looser cells where the scene says so, as new cells, and where these find no sound place for long, or
 // it lies under them, in the pores of the cells around it. rested: in sqrt(d/g)
-static bool deposit_parcel(silt_run *run, const double *x, double r, double mass, double rested, silt_deposit *deposit) {
+static bool deposit_parcel(silt_run *run, const double *x, double r, double mass, double rested, const silt_bed_others *others,
+                           silt_deposit *deposit) {
     const silt_scene *scene = run->scene;
     const double size = scene->bed.size, near = r + size, far = r + 3 * size, loose = scene->bed.porosity;
     const bool buried = silt_bed_contains(&run->bed, x);
@@ -293,7 +294,7 @@ static bool deposit_parcel(silt_run *run, const double *x, double r, double mass
         return false;
     if (scene->bed.densify && silt_bed_densify(&run->bed, scene, x, near, loose, mass, deposit) != DEPOSIT_REFUSED)
         return true;
-    if (!buried && silt_bed_deposit(&run->bed, scene, x, r, mass, deposit) != DEPOSIT_REFUSED)
+    if (!buried && silt_bed_deposit(&run->bed, scene, x, r, mass, others, deposit) != DEPOSIT_REFUSED)
         return true;
     if (!buried && rested < DEPOSIT_PATIENCE * DEPOSIT_TIME)
         return false;
@@ -307,6 +308,20 @@ static void remember_grown(silt_run *run, const silt_deposit *deposit) {
         remember_cell(run, run->bed.cell[deposit->cell[e]], cell_water(run, deposit->cell[e]), false);
 }
 
+static void take_others(const silt_run *run, const silt_grain_state *grains, silt_bed_others *others) {
+    uint8_t *at_rest = silt_alloc((size_t)grains->count + 1, 1);
+    for (int k = 0; k < grains->count; k++)
+        at_rest[k] = grain_slow(run, grains, k) && grain_rests(run, grains, k);
+    silt_bed_others_take(others, grains, at_rest);
+    free(at_rest);
+}
+
+static void become_bed(silt_run *run, const silt_grain_state *grains, int k, uint8_t *gone) {
+    silt_coupling_dem.deposit(run->coupling, k);
+    silt_sum(&run->ledger.deposited_mass, &run->ledger.deposited_rest, grains->mass[k]);
+    gone[k] = 1;
+}
+
 silt_status silt_run_deposit(silt_run *run, silt_error *err) {
     (void)err;
     const silt_scene *scene = run->scene;
@@ -318,11 +333,13 @@ silt_status silt_run_deposit(silt_run *run, silt_error *err) {
     int old = 0, kept = 0;
     silt_rest *fresh = silt_alloc((size_t)grains->count + 1, sizeof *fresh);
     bool changed = false;
+    silt_bed_others others = {0};
+    uint8_t *gone = silt_alloc((size_t)grains->count + 1, 1);
     for (int k = 0; k < grains->count; k++) {
         while (old < run->n_rest && run->rest[old].id < grains->id[k])
             old++;
         const double had = old < run->n_rest && run->rest[old].id == grains->id[k] ? run->rest[old].time : 0;
-        if (!grain_slow(run, grains, k))
+        if (gone[k] || !grain_slow(run, grains, k))
             continue;
         // what new cells have buried is bed
         const bool rests = grain_rests(run, grains, k) || silt_bed_contains(&run->bed, grains->x + 3 * k);
@@ -332,13 +349,20 @@ silt_status silt_run_deposit(silt_run *run, silt_error *err) {
         if (rests && now > DEPOSIT_TIME * sqrt(2 * grains->radius[k] / silt_max(g, 1e-12))) {
             silt_deposit deposit = {0};
             const double *x = grains->x + 3 * k, r = grains->radius[k], mass = grains->mass[k];
-            if (deposit_parcel(run, x, r, mass, now * sqrt(g / (2 * r)), &deposit)) {
-                silt_coupling_dem.deposit(run->coupling, k);
-                silt_sum(&run->ledger.deposited_mass, &run->ledger.deposited_rest, mass);
+            if (!others.grain)
+                take_others(run, grains, &others);
+            silt_bed_others_mark(&others, x, true);
+            if (deposit_parcel(run, x, r, mass, now * sqrt(g / (2 * r)), &others, &deposit)) {
+                become_bed(run, grains, k, gone);
+                for (int m = 0; m < deposit.n_other; m++) {
+                    become_bed(run, grains, deposit.other[m], gone);
+                    silt_bed_others_mark(&others, grains->x + 3 * deposit.other[m], true);
+                }
                 remember_grown(run, &deposit);
                 changed = true;
                 continue;
             }
+            silt_bed_others_mark(&others, x, false);
         }
         fresh[kept++] = (silt_rest){grains->id[k], now};
     }
@@ -346,6 +370,8 @@ silt_status silt_run_deposit(silt_run *run, silt_error *err) {
     memcpy(run->rest, fresh, (size_t)kept * sizeof *fresh);
     run->n_rest = kept;
     free(fresh);
+    free(gone);
+    silt_bed_others_clear(&others);
     if (changed) {
         silt_coupling_dem.bed_changed(run->coupling, &run->bed);
         run->bed_revision = run->bed.revision;

@@ -68,6 +68,11 @@ static void box_motion(silt_run *run, int dim, double lo[3], double hi[3]) {
             silt_walls_move(&run->walls, scene, silt_min(time, scene->time.end), 0);
             box_walls(run, w, run->way_lo, run->way_hi);
         }
+        // a record of accelerations may leave it with a velocity
+        if (motion->n_row && silt_path_accelerates(motion)) {
+            silt_walls_move(&run->walls, scene, scene->time.end, 0);
+            box_walls(run, w, run->way_lo, run->way_hi);
+        }
     }
     silt_walls_move(&run->walls, scene, 0, 0);
     if (run->way_lo[0] <= run->way_hi[0]) {

@@ -17,6 +17,9 @@ typedef struct silt_series {
     char *path;    // owned, the file as it was opened
 } silt_series;
 
+/** what is taken off an acceleration so that a record does not drift away */
+typedef enum { BASELINE_NONE = 0, BASELINE_VELOCITY, BASELINE_PLACE } silt_baseline;
+
 typedef enum { REGION_BOX = 1, REGION_POLYGON, REGION_CIRCLE, REGION_SPHERE } silt_region_kind;
 /** A closed part of the plane or of space. In 3-D a polygon stands upright: a prism over its corners (x, z), stored as the
  * first two of three numbers, from y = lo[1] to y = hi[1] (key `across`). A box with hi[2] > lo[2], a polygon with
@@ -51,8 +54,9 @@ typedef struct silt_wall {
     double scale;        // 3-D: what the surface's coordinates are multiplied by
     bool inside_out;     // 3-D: the surface's normals point out of the water
     double velocity[3];  // m/s, of the wall's surface along itself (a lid, a belt); no part of `motion`
-    silt_series motion;  // time in s first; x, y, z in m and angle in degrees from the place in the scene, by column name, absent
-                         // ones 0; in 3-D the angle turns about the y axis, from x to z; n_row 0: stands still
+    silt_series motion;  // a path (silt_path_at); in 3-D the angle turns about the y axis, from x to z; n_row 0: stands still
+    double motion_scale; // 1, factor on the numbers of its file
+    silt_baseline baseline; // of accelerations
     double pivot[3];     // m, what `angle` turns about
 } silt_wall;
 
@@ -289,7 +293,24 @@ typedef enum {
     SHAPE_POLYGON, // points relative to any origin, simple polygon; scaled so that its width is `scale` if scale > 0
     SHAPE_TEMPLE,  // columns under a roof, width `scale`; made in dem-coupling/shape.c
 } silt_shape;
-typedef enum { MOTION_FREE = 0, MOTION_FIXED } silt_motion;
+typedef enum { MOTION_FREE = 0, MOTION_FIXED, MOTION_PRESCRIBED } silt_motion;
+/** components of a body's motion, bits of silt_body_def.held */
+enum { HELD_X = 1, HELD_Y = 2, HELD_Z = 4, HELD_ANGLE = 8, HELD_ALL = 15 };
+/** a spring or line between a point of the body and a point in space */
+typedef struct silt_spring_def {
+    double at[3];     // m, the point of the body where it is at the start
+    double to[3];     // m
+    double stiffness; // N/m; 2-D: per metre of width, as all forces
+    double damping;   // N s/m, of the speed at which its length changes
+    double length;    // m, at rest; after reading never NaN
+    bool line;        // pulls, does not push
+} silt_spring_def;
+/** until when a body is held */
+typedef struct silt_release_def {
+    bool on;
+    double time;  // s; NaN: not by time
+    double force; // N, of all that acts on it; NaN: not by force
+} silt_release_def;
 typedef struct silt_body_def {
     char *name; // [a-z][a-z0-9_]*, unique
     silt_shape shape;
@@ -300,6 +321,13 @@ typedef struct silt_body_def {
     double density; // kg/m3
     double velocity[3];
     silt_motion motion;
+    silt_series path;  // MOTION_PRESCRIBED: a path (silt_path_at)
+    double path_scale; // 1, factor on the numbers of its file
+    silt_baseline baseline; // of accelerations
+    int held;          // HELD_ bits: components of the motion that are none
+    int n_spring;
+    silt_spring_def *spring; // owned
+    silt_release_def release;
     int n_point;
     double *point; // owned, polygon only, 3 per point, counter-clockwise after reading
 } silt_body_def;
@@ -400,6 +428,7 @@ struct silt_scene {
         double step;           // s, largest dt; 0: none
         double cfl;            // share of a cell that a node may cross in a step
         double checkpoint;     // s of model time between checkpoints, 0: 10 outputs
+        double wall;           // s on the clock of the wall that a process may take, then it stops with a checkpoint; 0: no limit
         int64_t steps;         // most steps, 0: no limit
         int retries;           // how often a failed step is halved
     } time;
@@ -429,6 +458,18 @@ void silt_series_constant(silt_series *series, double value); /**< a table of on
 int silt_series_column(const silt_series *series, const char *name); /**< column of that name, -1: none */
 /** What silt_series_at needs: two columns or more, finite numbers, column 0 strictly rising. The error names file and line. */
 silt_status silt_series_rising(const silt_series *series, silt_error *err);
+
+enum { PATH_COLUMNS = 8 };
+/** A path: time in s first, then by name any of x, y, z in m and angle in degrees from the place in the scene, linear between rows,
+ * constant outside; or their accelerations ax, ay, az, aangle, linear between rows, from rest at the first row, none after the last.
+ * @return how many columns it may have besides time, *name: which */
+int silt_path_columns(int dimension, const char *const **name);
+bool silt_path_accelerates(const silt_series *path);
+int silt_path_doubled(const silt_series *path); /**< column of an acceleration whose place is given too, -1: none */
+/** Multiplies by scale and integrates the accelerations once: columns of places and velocities are added. */
+void silt_path_settle(silt_series *path, double scale, silt_baseline baseline);
+/** x, y, z in m and the angle in radians at a time, exact */
+void silt_path_at(const silt_series *path, double time, double place[4]);
 
 /** m, k_s of the bed */
 static inline double silt_bed_roughness(const silt_scene *s) {

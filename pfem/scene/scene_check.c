@@ -770,6 +770,7 @@ void silt_scene_check(silt_reader *reader, silt_scene *scene) {
     check_inside(reader, scene);
     check_period(reader, scene);
     check_bodies(reader, scene);
+    silt_scene_check_motion(reader, scene);
     check_gauges(reader, scene);
     int n;
     check_column *column = check_columns(scene, &n);

@@ -143,6 +143,8 @@ static const char *help_type(const silt_key *key) {
     case KEY_WORD:
     case KEY_SIGN:
         return "word";
+    case KEY_SET:
+        return "list of words";
     case KEY_TEXT:
         return "text";
     case KEY_NAME:
@@ -174,6 +176,8 @@ static const char *help_type(const silt_key *key) {
         return "block";
     case KEY_LIST:
         return "list";
+    case KEY_TEXTS:
+        return "[value, ...]";
     }
     return "";
 }
@@ -185,6 +189,7 @@ char *silt_key_allowed(const silt_key *key, int dimension) {
     if (!to)
         return silt_text("%s", help_type(key));
     if (key->words) {
+        fprintf(to, key->kind == KEY_SET ? "a list of any of " : "");
         help_words(to, key->words);
     } else if (key->kind == KEY_BOX) {
         fprintf(to, dimension == 3 ? "two corners [[x0, y0, z0], [x1, y1, z1]] with x0 < x1, y0 < y1 and z0 < z1"
@@ -212,6 +217,8 @@ char *silt_key_allowed(const silt_key *key, int dimension) {
         fprintf(to, "a list of blocks, each %s", key->sub->what);
     } else if (key->kind == KEY_SWITCH || key->kind == KEY_POINT) {
         fprintf(to, "%s", help_type(key));
+    } else if (key->kind == KEY_TEXTS) {
+        fprintf(to, "a list of one or more values [value, ...]");
     } else if (key->kind == KEY_NAME) {
         fprintf(to, "a name of letters, digits and underscores that begins with a letter");
     } else if (key->kind == KEY_SURFACE) {
@@ -355,10 +362,10 @@ static const char *help_nearest(const silt_key_table *table, const char *wanted,
     return nearest;
 }
 
-silt_status silt_scene_help(const char *key, FILE *to, silt_error *err) {
+silt_status silt_keys_help(const silt_key_table *table, const char *key, const char *list, FILE *to, silt_error *err) {
     if (!key || !*key) {
         fprintf(to, "%-26s %-21s %-8s %-14s %s\n", "key", "type", "unit", "default", "range; meaning");
-        help_walk(to, &silt_scene_keys, "", NULL, false);
+        help_walk(to, table, "", NULL, false);
         return SILT_OK;
     }
     // drop item numbers: bodies.0.density is bodies.density
@@ -374,21 +381,25 @@ silt_status silt_scene_help(const char *key, FILE *to, silt_error *err) {
         part += n + (part[n] == '.');
     }
     *end = 0;
-    int n = *wanted ? help_walk(NULL, &silt_scene_keys, "", wanted, false) : 0;
+    int n = *wanted ? help_walk(NULL, table, "", wanted, false) : 0;
     silt_status status = SILT_OK;
     if (n == 0) {
         const char *last = strrchr(wanted, '.');
         last = last ? last + 1 : wanted;
         int best = help_slips(last) + 1;
-        const char *nearest = help_nearest(&silt_scene_keys, last, &best);
+        const char *nearest = help_nearest(table, last, &best);
         status =
-            silt_fail(err, SILT_INPUT, "help: found no key '%s'%s%s%s, allowed: one of the keys that `silt help` lists",
-                      key, nearest ? ", did you mean '" : "", nearest ? nearest : "", nearest ? "'?" : "");
+            silt_fail(err, SILT_INPUT, "help: found no key '%s'%s%s%s, allowed: one of the keys that `%s` lists",
+                      key, nearest ? ", did you mean '" : "", nearest ? nearest : "", nearest ? "'?" : "", list);
     } else {
-        help_walk(to, &silt_scene_keys, "", wanted, n == 1);
+        help_walk(to, table, "", wanted, n == 1);
     }
     free(wanted);
     return status;
+}
+
+silt_status silt_scene_help(const char *key, FILE *to, silt_error *err) {
+    return silt_keys_help(&silt_scene_keys, key, "silt help", to, err);
 }
 
 static void help_cell(FILE *to, const char *text) {
@@ -421,6 +432,8 @@ static void help_section(FILE *to, const silt_key_table *table, const char *path
             free(below);
         }
 }
+
+void silt_keys_document(const silt_key_table *table, FILE *to) { help_section(to, table, "", false); }
 
 void silt_scene_document(FILE *to) {
     fprintf(to,

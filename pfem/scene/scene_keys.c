@@ -49,7 +49,11 @@ static const silt_word arrange_words[] = {{"random", ARRANGE_RANDOM}, {"lattice"
 static const silt_word lift_words[] = {{"none", LIFT_NONE}, {"saffman", LIFT_SAFFMAN}, {0}};
 static const silt_word shape_words[] = {
     {"box", SHAPE_BOX}, {"disc", SHAPE_DISC}, {"polygon", SHAPE_POLYGON}, {"temple", SHAPE_TEMPLE}, {0}};
-static const silt_word motion_words[] = {{"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {0}};
+static const silt_word motion_words[] = {
+    {"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {"prescribed", MOTION_PRESCRIBED}, {0}};
+static const silt_word held_words[] = {{"x", HELD_X}, {"y", HELD_Y}, {"z", HELD_Z}, {"angle", HELD_ANGLE}, {0}};
+static const silt_word baseline_words[] = {
+    {"none", BASELINE_NONE}, {"velocity", BASELINE_VELOCITY}, {"place", BASELINE_PLACE}, {0}};
 static const silt_word front_words[] = {{"x", 1}, {"-x", -1}, {0}};
 static const silt_word norm_words[] = {{"l2", NORM_L2}, {"max", NORM_MAX}, {"mean", NORM_MEAN}, {0}};
 static const silt_word scalar_words[] = {{"none", SCALAR_NONE},
@@ -97,6 +101,8 @@ static const silt_key time_rows[] = {
      .doc = "share of a cell that a node may cross in a step"},
     {"checkpoint", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_scene, time.checkpoint),
      .doc = "time between checkpoints; 0: ten outputs"},
+    {"wall", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_scene, time.wall),
+     .doc = "seconds of the wall's clock after which a process stops with a checkpoint and exit code 3, as after SIGTERM; 0: no limit"},
     {"steps", KEY_LONG, .fallback = "0", RANGE(0, 1e15), AT(silt_scene, time.steps), .doc = "most steps; 0: no limit"},
     {"retries", KEY_INTEGER, .fallback = "8", RANGE(0, 30), AT(silt_scene, time.retries),
      .doc = "how often a failed step is halved"},
@@ -351,9 +357,14 @@ static const silt_key wall_rows[] = {
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_wall, velocity),
      .doc = "of the wall's surface along itself, which stays where it is: a lid, a belt"},
     {"motion", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_wall, motion),
-     .doc = "CSV file beside the scene: time in s, then any of x, y, z in m and angle in degrees from the place given "
-            "here, "
-            "columns by name; the angle turns from x to y (3-D: from x to z)"},
+     .doc = "CSV file beside the scene: time in s, then any of x, y, z in m and angle in degrees from the place given here, columns by "
+            "name; the angle turns from x to y (3-D: from x to z). In their place accelerations ax, ay, az in m/s2 and aangle in "
+            "degrees/s2, as of an earthquake: linear between rows, integrated exactly from rest at the first row, none after the last"},
+    {"motion_scale", KEY_NUMBER, .fallback = "1", AT(silt_wall, motion_scale),
+     .doc = "factor on all columns of `motion` but time: 9.81 where a record is in g"},
+    {"baseline", KEY_WORD, .fallback = "none", .words = baseline_words, AT(silt_wall, baseline),
+     .doc = "what is taken off the accelerations of `motion`: nothing, a constant so that the last row is at rest, or a straight line over "
+            "time so that it is at rest where it began"},
     {"pivot", KEY_POINT, .unit = "m", .fallback = "[0, 0]", AT(silt_wall, pivot), .doc = "what the angle turns about"},
     {0}};
 TABLE(wall, "a wall", silt_wall, offsetof(silt_wall, form));
@@ -511,6 +522,26 @@ static const silt_key contact_rows[] = {
     {0}};
 TABLE(contact, "the contact block", silt_contact_def, -1);
 
+static const silt_key spring_rows[] = {
+    {"at", KEY_POINT, .unit = "m", AT(silt_spring_def, at), .doc = "point of the body that it is tied to, where it is at the start"},
+    {"to", KEY_POINT, .unit = "m", AT(silt_spring_def, to), .doc = "point in space that it leads to"},
+    {"stiffness", KEY_NUMBER, .unit = "N/m", NOT_NEGATIVE, AT(silt_spring_def, stiffness),
+     .doc = "force per change of its length (2-D: per metre of width)"},
+    {"damping", KEY_NUMBER, .unit = "N s/m", .fallback = "0", NOT_NEGATIVE, AT(silt_spring_def, damping),
+     .doc = "force per speed at which its length changes"},
+    {"length", KEY_NUMBER, .unit = "m", .fallback = ".nan", NOT_NEGATIVE, AT(silt_spring_def, length),
+     .doc = "without force; default: what it has at the start"},
+    {"line", KEY_SWITCH, .fallback = "false", AT(silt_spring_def, line), .doc = "a mooring line: it pulls and does not push"},
+    {0}};
+TABLE(spring, "a spring", silt_spring_def, -1);
+
+static const silt_key release_rows[] = {
+    {"time", KEY_NUMBER, .unit = "s", .fallback = ".nan", NOT_NEGATIVE, AT(silt_body_def, release.time), .doc = "from which it is free"},
+    {"force", KEY_NUMBER, .unit = "N", .fallback = ".nan", NOT_NEGATIVE, AT(silt_body_def, release.force),
+     .doc = "that sets it free: of water, contacts, springs and weight together, in any direction (2-D: per metre of width)"},
+    {0}};
+TABLE(release, "until when the body is held", silt_body_def, -1);
+
 static const silt_key body_rows[] = {
     {"name", KEY_NAME, AT(silt_body_def, name), .doc = "begins its columns in history.csv"},
     {"shape", KEY_WORD, .flags = KEY_SELECTOR, .words = shape_words, AT(silt_body_def, shape), .doc = "outline"},
@@ -523,7 +554,18 @@ static const silt_key body_rows[] = {
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_body_def, density), .doc = "mean of the body"},
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_body_def, velocity), .doc = "at the start"},
     {"motion", KEY_WORD, .fallback = "free", .words = motion_words, AT(silt_body_def, motion),
-     .doc = "free to move, or held"},
+     .doc = "free to move, held where it is, or moved by `path` whatever acts on it"},
+    {"path", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_body_def, path),
+     .doc = "CSV file beside the scene: time in s, then any of x, y, z in m and angle in degrees from `at` and `angle`, or of their "
+            "accelerations, as walls.motion says; only with motion: prescribed"},
+    {"path_scale", KEY_NUMBER, .fallback = "1", AT(silt_body_def, path_scale), .doc = "factor on all columns of `path` but time"},
+    {"baseline", KEY_WORD, .fallback = "none", .words = baseline_words, AT(silt_body_def, baseline), .doc = "of `path`, as walls.baseline says"},
+    {"held", KEY_SET, .flags = KEY_OPTIONAL, .words = held_words, AT(silt_body_def, held),
+     .doc = "components of a free body's motion that are none: [x, angle] leaves heave only, [x, y] roll; z in 3-D only"},
+    {"springs", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &spring_table, MANY(silt_body_def, n_spring, spring),
+     .doc = "springs and mooring lines of a free body"},
+    {"release", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &release_table, .presence = PRESENT_FLAG, .present = offsetof(silt_body_def, release.on),
+     .doc = "a free body that is held until a time or until a force acts on it"},
     {"points", KEY_POLYGON, .unit = "m", .when = ONLY(SHAPE_POLYGON), MANY(silt_body_def, n_point, point),
      .doc = "corners of a polygon about any origin"},
     {0}};

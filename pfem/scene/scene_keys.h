@@ -16,6 +16,7 @@ typedef enum {
     KEY_LONG,       // int64_t
     KEY_SWITCH,     // bool
     KEY_WORD,       // int (an enum), one of words
+    KEY_SET,        // int, bits of any of words
     KEY_SIGN,       // double, one of words
     KEY_TEXT,       // char *
     KEY_NAME,       // char *, letters, digits, underscores
@@ -35,6 +36,7 @@ typedef enum {
     KEY_CORNERS,    // int at count, double * of 3 per point: at least 3 points [x, y, z]
     KEY_BLOCK,      // mapping
     KEY_LIST,       // int at count, array of structs: sequence of mappings
+    KEY_TEXTS,      // int at count, char ** at offset: values of any kind, as the text that -D takes
 } silt_key_kind;
 
 enum {
@@ -141,6 +143,7 @@ typedef struct silt_reader {
     int n_complaint; // may pass SCENE_COMPLAINTS, the rest is only counted
     silt_complaint complaint[SCENE_COMPLAINTS];
     const char *folder; // borrowed from the scene
+    const char *what, *first; // what such a file is and the key that it begins with; NULL: a scene, silt
 } silt_reader;
 
 /** Reads the file and the -D texts into reader->root. Syntax errors and -D errors become complaints. */
@@ -150,6 +153,9 @@ silt_tree *silt_tree_item(const silt_tree *mapping, const char *key); // NULL wh
 /** the node at a path like "bodies.0.name", or NULL */
 silt_tree *silt_tree_find(const silt_tree *root, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/** a value as -D takes it: lists and blocks on one line, a scalar as it stands; owned by the caller */
+char *silt_tree_text(const silt_tree *node);
+
 /** Adds a complaint at the node's value (or at its key). Text: "key 'a.b': found ..., allowed ..." */
 void silt_complain(silt_reader *reader, const silt_tree *node, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
@@ -157,6 +163,15 @@ void silt_complain_key(silt_reader *reader, const silt_tree *node, const char *f
     __attribute__((format(printf, 3, 4)));
 /** All complaints in the order of the text, each with its line and a caret, into err. SILT_OK when there are none. */
 silt_status silt_complaints_report(silt_reader *reader, silt_error *err);
+
+// files with another table than the scene's (studies) ------------------------------------------------------
+/** fills the struct of the table from reader->root; complaints as for a scene */
+void silt_keys_read(silt_reader *reader, const silt_key_table *table, void *base);
+/** frees what stands in the struct */
+void silt_keys_free(const silt_key_table *table, void *base);
+/** silt_scene_help and the tables of silt_scene_document for any table. @param list  what prints them all, for the message */
+silt_status silt_keys_help(const silt_key_table *table, const char *key, const char *list, FILE *to, silt_error *err);
+void silt_keys_document(const silt_key_table *table, FILE *to);
 
 // checks over several keys, and writing ------------------------------------------------------------------
 /** What a polygon of the scene must be: no corner twice in a row, no crossing, some area; turned counter-clockwise. A
@@ -171,6 +186,8 @@ void silt_scene_check(silt_reader *reader, silt_scene *scene);
 void silt_scene_check_openings(silt_reader *reader, const silt_scene *scene, const double lo[3], const double hi[3]);
 /** true where a grain of that radius at x touches no wall, bed or body */
 typedef bool silt_fill_clear(const void *context, const double *x, double radius);
+/** What moves bodies (scene_motion.c). */
+void silt_scene_check_motion(silt_reader *reader, const silt_scene *scene);
 /** Fills grains.regions into grains.filled; a complaint where more is asked for than fits (fill.c). */
 void silt_scene_fill(silt_reader *reader, silt_scene *scene, silt_fill_clear *clear, const void *context);
 /** the resolved scene as YAML; owned by the caller. names: files with their folder (true), or their last part only */

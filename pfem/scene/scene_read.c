@@ -356,6 +356,17 @@ static void read_list(read_state *state, const silt_key *key, const silt_tree *n
     }
 }
 
+static void read_texts(read_state *state, const silt_key *key, const silt_tree *node, const char *path, int *count, char ***text) {
+    if (node->kind != TREE_LIST || node->n_item == 0) {
+        read_refuse(state, node, key, path, "");
+        return;
+    }
+    *text = silt_alloc((size_t)node->n_item, sizeof **text);
+    *count = node->n_item;
+    for (int i = 0; i < node->n_item; i++)
+        (*text)[i] = silt_tree_text(node->item[i]);
+}
+
 static void read_row(read_state *state, const silt_key_table *table, const silt_key *key, void *base,
                      const silt_tree *node, const char *path) {
     void *at = (char *)base + key->offset, *count = (char *)base + key->count;
@@ -374,6 +385,13 @@ static void read_row(read_state *state, const silt_key_table *table, const silt_
     case KEY_WORD:
         if ((word = read_word(state, key, node, path)))
             memcpy(at, &word->value, sizeof word->value);
+        break;
+    case KEY_SET:
+        if (node->kind != TREE_LIST)
+            read_refuse(state, node, key, path, "");
+        for (int i = 0; node->kind == TREE_LIST && i < node->n_item; i++)
+            if ((word = read_word(state, key, node->item[i], path)))
+                *(int *)at |= word->value;
         break;
     case KEY_SIGN:
         if ((word = read_word(state, key, node, path)))
@@ -426,6 +444,9 @@ static void read_row(read_state *state, const silt_key_table *table, const silt_
         break;
     case KEY_LIST:
         read_list(state, key, node, path, count, at);
+        break;
+    case KEY_TEXTS:
+        read_texts(state, key, node, path, count, at);
         break;
     }
     if (key->flags & KEY_CHOICE && key->select)
@@ -678,6 +699,12 @@ static void read_free(const silt_key_table *table, void *base) {
     for (const silt_key *key = table->key; key->name; key++) {
         void *at = (char *)base + key->offset;
         switch (key->kind) {
+        case KEY_TEXTS:
+            for (int i = 0; i < *(int *)((char *)base + key->count); i++)
+                free((*(char ***)at)[i]);
+            free(*(void **)at);
+            *(void **)at = NULL;
+            break;
         case KEY_LIST: {
             int n = *(int *)((char *)base + key->count);
             for (int i = 0; i < n; i++)
@@ -706,6 +733,14 @@ static void read_free(const silt_key_table *table, void *base) {
             break;
         }
     }
+}
+
+void silt_keys_free(const silt_key_table *table, void *base) { read_free(table, base); }
+
+void silt_keys_read(silt_reader *reader, const silt_key_table *table, void *base) {
+    silt_scene none = {.dimension = 2};
+    read_state state = {.reader = reader, .scene = &none};
+    read_table(&state, table, base, reader->root, "");
 }
 
 void silt_scene_free(silt_scene **scene) {

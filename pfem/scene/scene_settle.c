@@ -158,10 +158,31 @@ bool silt_surface_is_shape(const char *path) {
 }
 
 // walls ------------------------------------------------------------------------------------------------
+// a path: columns that count, places or accelerations, which are integrated; item: the block, key: of the file in it
+static void settle_path(silt_reader *reader, const silt_tree *item, const char *where, const char *key, silt_series *path, int dimension,
+                        double scale, silt_baseline baseline) {
+    const silt_tree *node = silt_tree_item(item, key);
+    const char *const *name;
+    const int n = silt_path_columns(dimension, &name);
+    char *text = silt_text("%s.%s", where, key);
+    if (path->n_row && settle_columns(reader, node, text, path, name, n, 0, true)) {
+        const int doubled = silt_path_doubled(path);
+        if (doubled >= 0)
+            silt_complain(reader, node, "key '%s': found the columns '%s' and '%s' in %s, allowed the place or its acceleration", text,
+                          path->name[doubled] + 1, path->name[doubled], path->path);
+        else if (baseline != BASELINE_NONE && !silt_path_accelerates(path))
+            silt_complain(reader, silt_tree_item(item, "baseline"),
+                          "key '%s.baseline': found a file without accelerations, %s, allowed none, or one of the columns ax, ay%s, aangle", where,
+                          path->path, dimension == 3 ? ", az" : "");
+        else
+            silt_path_settle(path, scale, baseline);
+    }
+    free(text);
+}
+
 static void settle_wall(silt_reader *reader, const silt_scene *scene, silt_wall *wall, int i) {
-    static const char *const motion[4] = {"x", "y", "angle", "z"}; // z is last: not in 2-D
     const silt_tree *node = silt_tree_find(reader->root, "walls.%d", i);
-    char *path = silt_text("walls.%d.motion", i);
+    char *path = silt_text("walls.%d", i);
     if (wall->form == WALL_BOX && scene->dimension != 3 && wall->lo[0] < wall->hi[0]) {
         // its four corners, counter-clockwise
         const double *lo = wall->lo, *hi = wall->hi;
@@ -193,11 +214,22 @@ static void settle_wall(silt_reader *reader, const silt_scene *scene, silt_wall 
         if (file)
             fclose(file);
     }
-    if (wall->motion.n_row)
-        settle_columns(reader, silt_tree_item(node, "motion"), path, &wall->motion, motion,
-                       scene->dimension == 3 ? 4 : 3, 0, true);
+    settle_path(reader, node, path, "motion", &wall->motion, scene->dimension, wall->motion_scale, wall->baseline);
     if (wall->condition == WALL_DEFAULT)
         wall->condition = scene->fluid.on && scene->fluid.flow == FLOW_TURBULENT ? WALL_LAW : WALL_NO_SLIP;
+    free(path);
+}
+
+// bodies -----------------------------------------------------------------------------------------------
+static void settle_body(silt_reader *reader, const silt_scene *scene, silt_body_def *body, int i) {
+    char *path = silt_text("bodies.%d", i);
+    settle_path(reader, silt_tree_find(reader->root, "%s", path), path, "path", &body->path, scene->dimension, body->path_scale,
+                body->baseline);
+    for (int k = 0; k < body->n_spring; k++) {
+        silt_spring_def *s = &body->spring[k];
+        const double way[3] = {s->to[0] - s->at[0], s->to[1] - s->at[1], s->to[2] - s->at[2]};
+        s->length = isnan(s->length) ? silt_length(3, way) : s->length;
+    }
     free(path);
 }
 
@@ -420,6 +452,8 @@ void silt_scene_settle(silt_reader *reader, silt_scene *scene) {
     settle_regions(reader, scene);
     for (int i = 0; i < scene->n_wall; i++)
         settle_wall(reader, scene, &scene->wall[i], i);
+    for (int i = 0; i < scene->n_body; i++)
+        settle_body(reader, scene, &scene->body[i], i);
     settle_fluid(reader, scene);
     settle_bed(reader, scene);
     settle_fills(reader, scene);

@@ -186,6 +186,33 @@ silt_tree *silt_tree_find(const silt_tree *root, const char *format, ...) {
     return node;
 }
 
+static void tree_flow(FILE *to, const silt_tree *node, bool inside) {
+    const char *between = "";
+    if (node->kind == TREE_SCALAR) {
+        fprintf(to, inside && node->quoted ? "'%s'" : "%s", node->text);
+        return;
+    }
+    fputc(node->kind == TREE_LIST ? '[' : '{', to);
+    for (int i = 0; i < node->n_item; i++, between = ", ") {
+        fputs(between, to);
+        if (node->kind == TREE_MAPPING)
+            fprintf(to, "%s: ", node->item[i]->key);
+        tree_flow(to, node->item[i], true);
+    }
+    fputc(node->kind == TREE_LIST ? ']' : '}', to);
+}
+
+char *silt_tree_text(const silt_tree *node) {
+    char *text = NULL;
+    size_t size = 0;
+    FILE *to = open_memstream(&text, &size);
+    if (!to)
+        return silt_text("%s", "");
+    tree_flow(to, node, false);
+    fclose(to);
+    return text;
+}
+
 void silt_reader_clear(silt_reader *reader) {
     for (int i = 0; i < reader->n_node; i++) {
         silt_tree *node = reader->node[i];
@@ -607,6 +634,11 @@ static void tree_set(silt_reader *reader, int source, char *path, silt_tree *val
     }
 }
 
+static char *tree_begins(const silt_reader *reader, const char *found) {
+    const char *first = reader->first ? reader->first : "silt";
+    return silt_text("key '%s': found %s, allowed a %s, which begins with %s: 1", first, found, reader->what ? reader->what : "scene", first);
+}
+
 void silt_tree_read(silt_reader *reader, const char *path, int n_set, const char *const *set) {
     if (!tree_load(reader, path))
         return;
@@ -614,12 +646,13 @@ void silt_tree_read(silt_reader *reader, const char *path, int n_set, const char
     if (reader->n_complaint)
         return;
     if (!reader->root) {
-        tree_complain_at(reader, 0, 1, 1,
-                         silt_text("key 'silt': found an empty file, allowed a scene, which begins with silt: 1"));
+        tree_complain_at(reader, 0, 1, 1, tree_begins(reader, "an empty file"));
         return;
     }
     if (reader->root->kind != TREE_MAPPING) {
-        silt_complain(reader, reader->root, "key 'silt': found no keys, allowed a scene, which begins with silt: 1");
+        char *text = tree_begins(reader, "no keys");
+        silt_complain(reader, reader->root, "%s", text);
+        free(text);
         reader->root = NULL;
         return;
     }

@@ -466,12 +466,10 @@ static void turn(int dim, double cosine, double sine, const double v[3], double 
 }
 
 static void series_place(const silt_series *motion, double time, double shift[3], double *angle) {
-    static const char *const name[4] = {"x", "y", "z", "angle"};
-    for (int d = 0; d < 4; d++) {
-        const int column = silt_series_column(motion, name[d]);
-        const double value = column > 0 ? silt_series_at(motion, column, time) : 0;
-        *(d < 3 ? &shift[d] : angle) = d < 3 ? value : value * M_PI / 180;
-    }
+    double place[4];
+    silt_path_at(motion, time, place);
+    memcpy(shift, place, 3 * sizeof *shift);
+    *angle = place[3];
 }
 
 static void motion_take(silt_walls *walls, const silt_wall *wall, int w, double time, double dt) {
@@ -501,6 +499,7 @@ static void motion_take(silt_walls *walls, const silt_wall *wall, int w, double 
 
 void silt_walls_move(silt_walls *walls, const silt_scene *scene, double time, double dt) {
     struct silt_wall_index *index = walls->index;
+    walls->time = time;
     if (!index || !index->place)
         return;
     const int dim = wall_dim(walls);
