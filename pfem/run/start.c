@@ -1,6 +1,8 @@
 // the state at t = 0: box of the scene, bed, bodies, the cloud of nodes and the first mesh
 #include "run.h"
 
+#define WATER_MADE 0.1 // largest share by which the first cells may miss the regions without a word
+
 static bool run_solid(const void *context, const double *x, double margin) {
     const silt_barrier *barrier = context;
     if (barrier->bed && (silt_bed_contains(barrier->bed, x) || silt_bed_near(barrier->bed, x, margin)))
@@ -128,6 +130,29 @@ void silt_run_locate(silt_run *run) {
         silt_locator_build(&run->locator, &run->mesh, run->nodes.x, run->scene->fluid.size);
 }
 
+// Regions and clouds too thin for any cell hold no water; those that are coarsely met are told. Where bed or bodies stand in regions, or
+// the water is a cloud, nobody knows beforehand how much there is.
+static silt_status water_there(const silt_run *run, silt_error *err) {
+    const silt_scene *scene = run->scene;
+    const silt_fluid_def *fluid = &scene->fluid;
+    if (run->mesh.n_cell == 0 && fluid->n_inlet == 0)
+        return silt_fail(err, SILT_INPUT, fluid->cloud ? "key 'fluid.cloud': found nodes of which no three make a cell of water (in space no four), allowed nodes about "
+                                                         "fluid.size = %g m apart that fill an area (a volume)"
+                                                       : "key 'fluid.regions': found water in which no cell of fluid.size = %g m has room, allowed regions that are "
+                                                         "wider than a cell; smaller fluid.size", fluid->size);
+    if (fluid->cloud || scene->bed.on || scene->n_body)
+        return SILT_OK;
+    double wanted = 0, made = 0;
+    for (int r = 0; r < fluid->n_region; r++)
+        wanted += silt_region_area(&fluid->region[r]);
+    for (int e = 0; e < run->mesh.n_cell; e++)
+        made += silt_cell_volume(&run->mesh, run->nodes.x, e);
+    if (fabs(made - wanted) > WATER_MADE * wanted)
+        silt_run_warn(run, "the water's regions hold %.4g m%d, its cells %.4g at the start: smaller fluid.size, or regions that overlap", wanted, scene->dimension,
+                      made);
+    return SILT_OK;
+}
+
 silt_status silt_run_first(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     if (scene->bed.on)
@@ -171,6 +196,7 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
     else
         silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
     SILT_TRY(silt_mesh_first(&run->mesh, &run->nodes, scene, &run->barrier, err));
+    SILT_TRY(water_there(run, err));
     silt_size_update(run->size, &run->nodes, &run->mesh);
     SILT_TRY(silt_run_pockets(run, err));
     // nodes of the cloud that got no cell at the start are no drops: they hold no water
