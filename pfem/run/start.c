@@ -130,6 +130,20 @@ void silt_run_locate(silt_run *run) {
         silt_locator_build(&run->locator, &run->mesh, run->nodes.x, run->scene->fluid.size);
 }
 
+// some node lies on no facet of the boundary
+static bool water_deep(const silt_mesh *mesh) {
+    const int D = mesh->dim == 3 ? 3 : 2;
+    uint8_t *rim = silt_alloc((size_t)mesh->n_node + 1, sizeof *rim);
+    bool deep = false;
+    for (int f = 0; f < mesh->n_facet; f++)
+        for (int a = 0; a < D; a++)
+            rim[mesh->facet[f][a]] = 1;
+    for (int i = 0; i < mesh->n_node && !deep; i++)
+        deep = mesh->wet[i] && !rim[i];
+    free(rim);
+    return deep;
+}
+
 // Regions and clouds too thin for any cell hold no water; those that are coarsely met are told. Where bed or bodies stand in regions, or
 // the water is a cloud, nobody knows beforehand how much there is.
 static silt_status water_there(const silt_run *run, silt_error *err) {
@@ -140,7 +154,12 @@ static silt_status water_there(const silt_run *run, silt_error *err) {
                                                          "fluid.size = %g m apart that fill an area (a volume)"
                                                        : "key 'fluid.regions': found water in which no cell of fluid.size = %g m has room, allowed regions that are "
                                                          "wider than a cell; smaller fluid.size", fluid->size);
-    if (fluid->cloud || scene->bed.on || scene->n_body)
+    if (fluid->cloud)
+        return SILT_OK;
+    if (fluid->n_inlet == 0 && !water_deep(&run->mesh))
+        silt_run_warn(run, "no node lies inside of the water, whose pressure is then that of its walls and its surface alone: it is no deeper than "
+                           "fluid.size = %g m; smaller fluid.size", fluid->size);
+    if (scene->bed.on || scene->n_body)
         return SILT_OK;
     double wanted = 0, made = 0;
     for (int r = 0; r < fluid->n_region; r++)

@@ -464,12 +464,14 @@ static bool check_clear_at(const void *context, const double *x, double radius) 
 
 // what all keys are sound for
 static void check_fill(silt_reader *reader, silt_scene *scene) {
-    if (reader->n_complaint > 0 || scene->grains.n_fill == 0)
+    if (reader->n_complaint > 0 || (scene->grains.n_fill == 0 && scene->grains.n_grain == 0))
         return;
     check_clear clear = {scene, silt_alloc((size_t)scene->n_body + 1, sizeof *clear.body)};
     for (int i = 0; i < scene->n_body; i++)
         clear.body[i] = check_shape_make(&scene->body[i]);
-    silt_scene_fill(reader, scene, check_clear_at, &clear);
+    silt_scene_check_grains(reader, scene, check_clear_at, &clear);
+    if (scene->grains.n_fill > 0)
+        silt_scene_fill(reader, scene, check_clear_at, &clear);
     for (int i = 0; i < scene->n_body; i++)
         free(clear.body[i].point);
     free(clear.body);

@@ -185,6 +185,8 @@ void silt_scene_check(silt_reader *reader, silt_scene *scene);
 void silt_scene_check_openings(silt_reader *reader, const silt_scene *scene, const double lo[3], const double hi[3]);
 /** true where a grain of that radius at x touches no wall, bed or body */
 typedef bool silt_fill_clear(const void *context, const double *x, double radius);
+/** Grains of the list that stand in each other, in a wall, the bed or a body: contacts would throw them apart (fill.c). Fixed ones may. */
+void silt_scene_check_grains(silt_reader *reader, const silt_scene *scene, silt_fill_clear *clear, const void *context);
 /** Fills grains.regions into grains.filled; a complaint where more is asked for than fits (fill.c). */
 void silt_scene_fill(silt_reader *reader, silt_scene *scene, silt_fill_clear *clear, const void *context);
 /** the resolved scene as YAML; owned by the caller. names: files with their folder (true), or their last part only */
