@@ -21,15 +21,16 @@ static struct {
     dem_shared *shared;
     int call;              // since the run began; the first is that of its set-up
     double *sum;           // owned, contact forces of the present substep, ROW per body
+    double *tie;           // owned, the same of springs and lines
     double *centre;        // owned, 3 per body
     double **centre_row;   // owned, rows of centre
     int *first;            // owned, local index of each body's first sphere, -1: it has left
 } response;
 
 // Half kicks at the ends: the forces of the set-up and of the last substep count half
-static double response_weight(void) {
+static double response_weight(int call) {
     const int n = response.shared->n_step;
-    return (response.call == 0 || response.call == n ? 0.5 : 1.0) / n;
+    return (call == 0 || call == n ? 0.5 : 1.0) / n;
 }
 
 static void response_contacts(int n, const int *tag, double **x, double **force, double **torque) {
@@ -64,22 +65,29 @@ static void response_contacts(int n, const int *tag, double **x, double **force,
     }
 }
 
+// rows of body b
+static void response_times(int b, const double *force, double *out) {
+    const dem_shared *s = response.shared;
+    const double *matrix = DEM_SECTION(s, const double, response);
+    const size_t n = ROW * (size_t)s->n_body;
+    for (int r = 0; r < ROW; r++)
+        for (size_t k = 0; k < n; k++)
+            if (force[k] != 0)
+                out[r] += matrix[((size_t)ROW * (size_t)b + (size_t)r) * n + k] * force[k];
+}
+
 // the water's answer, on each body's first sphere
 static void response_answer(double **x, double **force, double **torque) {
     const dem_shared *s = response.shared;
     dem_body *body = DEM_SECTION(s, dem_body, body);
-    const double *matrix = DEM_SECTION(s, const double, response);
-    const int n = ROW * s->n_body;
     for (int b = 0; b < s->n_body; b++) {
         const int i = response.first[b];
         double out[ROW] = {0}, arm[3];
-        for (int r = 0; r < ROW && i >= 0; r++)
-            for (int k = 0; k < n; k++)
-                if (response.sum[k] != 0)
-                    out[r] += matrix[(size_t)(ROW * b + r) * (size_t)n + (size_t)k] * response.sum[k];
+        if (i >= 0)
+            response_times(b, response.sum, out);
         for (int r = 0; r < ROW; r++) {
-            body[b].contact[r] += response_weight() * response.sum[ROW * b + r];
-            body[b].answer[r] += response_weight() * out[r];
+            body[b].contact[r] += response_weight(response.call) * response.sum[ROW * b + r];
+            body[b].answer[r] += response_weight(response.call) * out[r];
         }
         for (int c = 0; c < 3 && i >= 0; c++)
             arm[c] = x[i][c] - response.centre[3 * b + c];
@@ -105,6 +113,7 @@ static void response_step(void *self, long step, int n, int *tag, double **x, do
     void *data = response.centre_row;
     memset(response.centre, 0, 3 * (size_t)n_body * sizeof(double));
     memset(response.sum, 0, ROW * (size_t)n_body * sizeof(double));
+    memset(response.tie, 0, ROW * (size_t)n_body * sizeof(double));
     lg_push("xcm", "vector-multisphere", response.lmp, &data, "double");
     response_contacts(n, tag, x, force, torque);
     response_answer(x, force, torque);
@@ -125,10 +134,11 @@ int response_begin(void *lmp, dem_shared *shared) {
     response.shared = shared;
     response.call = 0;
     response.sum = realloc(response.sum, (ROW * n + 1) * sizeof(double));
+    response.tie = realloc(response.tie, (ROW * n + 1) * sizeof(double));
     response.centre = realloc(response.centre, (3 * n + 1) * sizeof(double));
     response.centre_row = realloc(response.centre_row, (n + 1) * sizeof *response.centre_row);
     response.first = realloc(response.first, (n + 1) * sizeof *response.first);
-    if (!response.sum || !response.centre || !response.centre_row || !response.first)
+    if (!response.sum || !response.tie || !response.centre || !response.centre_row || !response.first)
         return 0;
     for (size_t b = 0; b < n; b++) {
         response.centre_row[b] = response.centre + 3 * b;
@@ -136,6 +146,25 @@ int response_begin(void *lmp, dem_shared *shared) {
         memset(body[b].answer, 0, sizeof body[b].answer);
     }
     return 1;
+}
+
+static int response_tied(void) { return response.shared && response.shared->n_response && response.call > 0; }
+
+void response_tie(int slot, const double pull[6]) {
+    for (int r = 0; r < ROW && response_tied(); r++)
+        response.tie[ROW * slot + r] += pull[r];
+}
+
+void response_ties(int slot, double answer[6]) {
+    memset(answer, 0, ROW * sizeof *answer);
+    if (!response_tied())
+        return;
+    dem_body *body = &DEM_SECTION(response.shared, dem_body, body)[slot];
+    response_times(slot, response.tie, answer);
+    for (int r = 0; r < ROW; r++) {
+        body->contact[r] += response_weight(response.call - 1) * response.tie[ROW * slot + r];
+        body->answer[r] += response_weight(response.call - 1) * answer[r];
+    }
 }
 
 void response_end(void) {

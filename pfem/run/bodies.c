@@ -203,6 +203,18 @@ static void inertia_turned(const struct silt_body *body, double tensor[3][3]) {
                     tensor[d][c] += own[a][b] * axis[a][d] * axis[b][c];
 }
 
+// whether forces move a body in this mode
+static bool moves(const silt_body_def *def, int mode) {
+    return def->motion == MOTION_FREE && !(def->held >> (mode < 3 ? mode : 3) & 1);
+}
+
+// it waits for its release, which hangs on the force that acts on it as it stands; in the rest of the step in which that comes it moves
+// with its own mass
+static bool waits(const silt_run *run, int b) {
+    const struct silt_body *body = &run->body_before[b];
+    return run->scene->body[b].release.on && silt_length(3, body->v) == 0 && silt_length(3, body->w) == 0;
+}
+
 static silt_impedance impedance_begin(const silt_run *run) {
     silt_impedance z = {0};
     const int *mode, n_mode = modes(run, &mode);
@@ -225,8 +237,10 @@ static silt_impedance impedance_begin(const silt_run *run) {
             for (int c = 0; c < 3; c++)
                 z.mass[(ROW * k + 3 + d) * z.size + ROW * k + 3 + c] = tensor[d][c];
         }
+        const silt_body_def *def = &run->scene->body[z.body[k]];
         for (int m = 0; m < n_mode; m++)
-            z.live[z.n_live++] = ROW * k + mode[m];
+            if (moves(def, mode[m]) && !waits(run, z.body[k]))
+                z.live[z.n_live++] = ROW * k + mode[m];
     }
     return z;
 }
@@ -367,9 +381,14 @@ static silt_status impedance_tell(silt_run *run, silt_impedance *z, const double
         goto done;
     times(n, z->mass, a, out);
     for (int k = 0; k < z->n; k++)
-        for (int d = 0; d < 3; d++) {
+        for (int d = 0; d < 3; d++) { // what is not live is held or led
             bodies->body[z->body[k]].force[d] = out[ROW * k + d] - weight[ROW * k + d];
             bodies->body[z->body[k]].torque[d] = out[ROW * k + 3 + d] + gyration[ROW * k + 3 + d];
+        }
+    for (int k = 0; k < z->n; k++)
+        for (int d = 0; d < 3 && waits(run, z->body[k]); d++) {
+            bodies->body[z->body[k]].force[d] = force[ROW * z->body[k] + d];
+            bodies->body[z->body[k]].torque[d] = force[ROW * z->body[k] + 3 + d];
         }
     for (int c = 0; c < n; c++) {
         memset(load, 0, (size_t)n * sizeof *load);
@@ -379,11 +398,15 @@ static silt_status impedance_tell(silt_run *run, silt_impedance *z, const double
         for (int r = 0; r < n; r++)
             z->answer[r * n + c] = out[r] - (r == c);
     }
-    // what lies out of the plane is not the water's
+    // what does not move under forces has no answer
+    uint8_t *free_row = silt_alloc((size_t)n + 1, 1);
+    for (int l = 0; l < m; l++)
+        free_row[z->live[l]] = 1;
     for (int r = 0; r < n; r++)
         for (int c = 0; c < n; c++)
-            if (silt_nodes_dim(&run->nodes) == 2 && ((r % ROW > 1 && r % ROW < 5) || (c % ROW > 1 && c % ROW < 5)))
+            if (!free_row[r] || !free_row[c])
                 z->answer[r * n + c] = 0;
+    free(free_row);
 done:
     free(factor);
     free(work);
@@ -490,22 +513,22 @@ silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_er
     run->body_error = 0;
     for (int b = 0; b < run->n_body_before; b++) {
         struct silt_body *body = &bodies->body[b];
-        const bool fixed = run->scene->body[b].motion == MOTION_FIXED;
-        double off[3], size = 0;
-        for (int d = 0; d < 3 && !fixed; d++) {
+        const silt_body_def *def = &run->scene->body[b];
+        const struct silt_body *old = &run->body_before[b];
+        const bool still = waits(run, b);
+        double off[3] = {0}, size = 0;
+        for (int d = 0; d < 3 && !still; d++) {
             // what moved it came of weight, contacts and water
-            const double moved = body->mass * (body->v[d] - run->body_before[b].v[d]) / run->dt, weight = body->mass * run->scene->gravity[d];
-            off[d] = moved - weight - body->contact[d] - body->force[d];
+            const double moved = body->mass * (body->v[d] - old->v[d]) / run->dt, weight = body->mass * run->scene->gravity[d];
+            off[d] = moves(def, d) ? moved - weight - body->contact[d] - body->force[d] : 0;
             size += fabs(moved) + fabs(weight) + fabs(body->contact[d]) + fabs(body->force[d]);
         }
-        if (!fixed && size > 0)
+        if (size > 0)
             run->body_error = silt_max(run->body_error, silt_length(3, off) / size);
-        for (int d = 0; d < 3; d++) {
-            double *carry = run->body_carry[b];
-            carry[d] = fixed ? 0 : carry[d] + run->dt * (force[ROW * b + d] - body->force[d]);
-            carry[3 + d] = fixed ? 0 : carry[3 + d] + run->dt * (force[ROW * b + 3 + d] - body->torque[d]);
-            body->force[d] = force[ROW * b + d];
-            body->torque[d] = force[ROW * b + 3 + d];
+        for (int d = 0; d < 6; d++) {
+            double *told = d < 3 ? &body->force[d] : &body->torque[d - 3], *carry = &run->body_carry[b][d];
+            *carry = !still && moves(def, d) ? *carry + run->dt * (force[ROW * b + d] - *told) : 0;
+            *told = force[ROW * b + d];
         }
     }
     free(force);

@@ -14,6 +14,8 @@ silt_status silt_run_grains(silt_run *run, int n, bool again, silt_error *err) {
     silt_coupling_dem.load(run->coupling, &moving, &run->mesh, run->dt);
     if (run->scene->grains.random_walk && run->fluid.mu)
         silt_coupling_dem.walk(run->coupling, &run->nodes, &run->mesh, run->fluid.mu, run->dt, run->step);
+    if (run->scene->grains.gusts > 0 && run->fluid.mu)
+        silt_coupling_dem.gusts(run->coupling, &run->nodes, &run->mesh, run->fluid.mu, run->time + run->dt);
     if (!again && !silt_run_set_up_due(run))
         silt_coupling_dem.keep(run->coupling);
     SILT_TRY(silt_coupling_dem.start(run->coupling, n, err));
