@@ -166,6 +166,8 @@ void silt_coupling_forget_old(silt_coupling *coupling);
  * water's mesh, that lies behind a wall or in another body. */
 silt_status silt_coupling_bodies(silt_coupling *coupling, silt_error *err);
 void silt_coupling_bodies_clear(silt_coupling *coupling);
+/** m, wanted distance between the water's nodes on a body, fluid.size or what fluid.sizes say there; radius: of the body */
+double silt_coupling_body_size(const silt_scene *scene, const silt_body_def *def, double radius);
 /** tells the discrete elements of them */
 silt_status silt_coupling_send_bodies(silt_coupling *coupling, silt_error *err);
 /** distance from a point to body i; beyond `far` only a lower bound of it */
