@@ -148,6 +148,13 @@ static void rims_close(const silt_uplift *u, silt_run *run) {
     }
 }
 
+void silt_uplift_open(const silt_uplift *u, silt_run *run) {
+    silt_mesh *mesh = &run->mesh;
+    for (int k = 0; u && k < u->n_rim; k++)
+        for (int c = 0; c < 2 && mesh->facet_kind[u->rim[k][1]] == FACET_FREE; c++)
+            mesh->surface[mesh->facet[u->rim[k][1]][c]] = 1;
+}
+
 void silt_uplift_find(silt_uplift **uplift, silt_run *run) {
     if (!*uplift)
         *uplift = silt_alloc(1, sizeof **uplift);
