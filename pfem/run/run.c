@@ -320,7 +320,6 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     }
     if (scene->fluid.on && silt_run_bodies_free(run) && silt_seep_on(scene))
         silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
-    silt_uplift_open(run->uplift, run);
     if (run->coupling && scene->bed.on)
         SILT_CLOCKED(bed, status = silt_run_deposit(run, err));
     SILT_TRY(status);
