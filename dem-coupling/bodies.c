@@ -136,7 +136,6 @@ silt_status silt_coupling_bodies(silt_coupling *c, silt_error *err) {
         }
         SILT_TRY(c->dim == 3 ? body_space(scene, &c->body[i], state, def, place[3], err) : body_plane(&c->body[i], state, def, place[3], err));
     }
-    silt_coupling_held(c);
     return c->dim == 3 ? bodies_apart(c, err) : SILT_OK;
 }
 

@@ -585,8 +585,8 @@ static void worker_run(void) {
         worker_set_up();
     if (s->n_step > 0)
         worker_advance(s->n_step);
-    motion_end();
     response_end();
+    motion_end();
     worker_answer();
 }
 
