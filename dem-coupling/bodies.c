@@ -140,7 +140,26 @@ silt_status silt_coupling_bodies(silt_coupling *c, silt_error *err) {
         }
         SILT_TRY(c->dim == 3 ? body_space(scene, &c->body[i], state, def, place[3], err) : body_plane(&c->body[i], state, def, place[3], err));
     }
+    for (int i = 0; i < scene->n_body; i++) {
+        c->bodies->body[i].n_sphere = c->body[i].clump.n_sphere;
+        c->bodies->body[i].clump_error = c->body[i].clump.error;
+    }
     return c->dim == 3 ? bodies_apart(c, err) : SILT_OK;
+}
+
+silt_status silt_coupling_describe(const silt_scene *scene, FILE *to, silt_error *err) {
+    silt_coupling c = {.scene = scene, .dim = scene->dimension == 3 ? 3 : 2};
+    const silt_status status = silt_coupling_bodies(&c, err);
+    for (int i = 0; i < scene->n_body && status == SILT_OK; i++) {
+        const struct silt_body *b = &c.bodies->body[i];
+        fprintf(to, "  body       %s: %g %s, %g kg%s, clump of %d spheres within %.3g m of its surface\n", scene->body[i].name, b->volume,
+                c.dim == 3 ? "m3" : "m2", b->mass, c.dim == 3 ? "" : " per m", b->n_sphere, b->clump_error);
+    }
+    silt_coupling_bodies_clear(&c);
+    free(c.body);
+    free(c.body_force);
+    free(c.body_torque);
+    return status;
 }
 
 void silt_coupling_bodies_clear(silt_coupling *c) {

@@ -144,6 +144,7 @@ bool silt_coupling_left_domain(const silt_coupling *coupling, const coupling_gra
 silt_status silt_coupling_bodies(silt_coupling *coupling, silt_error *err);
 /** in space: how a body is turned by an angle, radians, about its axis */
 void silt_coupling_orientation(const silt_body_def *def, double angle, double q[4]);
+silt_status silt_coupling_describe(const silt_scene *scene, FILE *to, silt_error *err);
 void silt_coupling_bodies_clear(silt_coupling *coupling);
 /** tells the discrete elements of them */
 silt_status silt_coupling_send_bodies(silt_coupling *coupling, silt_error *err);
