@@ -720,6 +720,7 @@ const silt_coupling_type silt_coupling_dem = {
     .gusts = silt_coupling_gusts,
     .exchanged = coupling_exchanged,
     .outline = coupling_outline,
+    .describe = silt_coupling_describe,
     .room = coupling_room,
     .release = coupling_release,
     .deposit = coupling_deposit,

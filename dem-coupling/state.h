@@ -166,6 +166,9 @@ void silt_coupling_forget_old(silt_coupling *coupling);
 /** Surfaces, clumps, masses and places of the scene's bodies. Errors (SILT_INPUT): a shape that cannot be, that is too thin for the
  * water's mesh, that lies behind a wall or in another body. */
 silt_status silt_coupling_bodies(silt_coupling *coupling, silt_error *err);
+/** in space: how a body is turned by an angle, radians, about its axis */
+void silt_coupling_orientation(const silt_body_def *def, double angle, double q[4]);
+silt_status silt_coupling_describe(const silt_scene *scene, FILE *to, silt_error *err);
 void silt_coupling_bodies_clear(silt_coupling *coupling);
 /** tells the discrete elements of them */
 silt_status silt_coupling_send_bodies(silt_coupling *coupling, silt_error *err);

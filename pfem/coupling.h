@@ -55,6 +55,8 @@ typedef struct silt_coupling_type {
     /** After load: the gusts of the step that begins at `time`, if the scene asks for them. */
     void (*gusts)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, const double *viscosity, double time);
 
+    /** a line about every body of a scene: volume, mass, clump; errors as open's for bodies, walls apart */
+    silt_status (*describe)(const silt_scene *scene, FILE *to, silt_error *err);
     /** of the last load and the last substeps */
     void (*exchanged)(const silt_coupling *coupling, silt_exchanged *exchanged);
     /** Points on a body's outline at spacing h, corners kept, in the body's frame, dim numbers each; in space those of its surface,
