@@ -75,13 +75,13 @@ static void guide_walls(silt_coupling *c, dem_guide *guide) {
 }
 
 void silt_coupling_guide(silt_coupling *c, int n) {
-    dem_guide head = {.n_step = n, .n_wall = c->accelerates ? c->n_motion : 0};
+    dem_guide head = {.n_step = n, .n_wall = c->accelerates ? c->n_motion : 0, .n_trace = silt_trace_count(c)};
     for (int i = 0; i < c->bodies->count; i++) {
         head.n_body += guide_needed(c, i);
         head.n_path += c->scene->body[i].motion == MOTION_PRESCRIBED;
         head.n_tie += c->scene->body[i].n_spring;
     }
-    if (n == 0 || (!head.n_body && !head.n_tie && !head.n_wall))
+    if (n == 0 || (!head.n_body && !head.n_tie && !head.n_wall && !head.n_trace))
         return;
     const size_t size = dem_guide_size(&head);
     SILT_RESERVE(c->guide, c->guide_capacity, (int)size);
@@ -97,6 +97,8 @@ void silt_coupling_guide(silt_coupling *c, int n) {
         tie += c->scene->body[i].n_spring;
     }
     guide_walls(c, guide);
+    if (head.n_trace)
+        silt_trace_ask(c, guide);
     silt_dem_guide(c->dem, c->guide, size);
 }
 
@@ -118,7 +120,7 @@ silt_status silt_coupling_freed(silt_coupling *c, bool out, silt_store *store, s
     return status;
 }
 
-void silt_coupling_guided(silt_coupling *c) {
+silt_status silt_coupling_guided(silt_coupling *c, silt_error *err) {
     const dem_guide *told = silt_dem_guided(c->dem);
     for (int i = 0, k = 0; told && i < c->bodies->count; i++) {
         if (!guide_needed(c, i))
@@ -128,4 +130,5 @@ void silt_coupling_guided(silt_coupling *c) {
         if (release->on && (body->freed || body->release <= told->n_step))
             c->body[i].freed = true;
     }
+    return silt_trace_write(c, told, err);
 }
