@@ -128,7 +128,7 @@ EXCHANGE smooth(const int D, silt_exchange *e, const double *water) {
             for (int k = 0; k < D; k++)
                 read[n_field * cell->at[a] + READ_GRADIENT(D, k)] += sum[k];
     }
-    silt_kernel_solve(&e->kernel, n_field, read);
+    silt_kernel_sample(&e->kernel, n_field, read);
 }
 
 void silt_exchange_slope(const silt_exchange *e, int near, double slope[4][3]) { BY_DIM(e, exchange_slope, e, &e->cell[near], slope); }
@@ -138,6 +138,20 @@ void silt_exchange_slope(const silt_exchange *e, int near, double slope[4][3]) {
 static void exchange_smooth(silt_exchange *e, const double *water) { BY_DIM(e, smooth, e, water); }
 
 // ---------------------------------------------------------------- parts of a step
+
+// the rows of the kernel that a grain has to do with
+static void exchange_rows(const silt_exchange *e, const silt_exchange_grain *g, int place[4], double weight[4]) {
+    const int D = e->dim, *node = e->mesh->cell[g->cell];
+    for (int a = 0; a <= D; a++) {
+        place[a] = e->layer_grain > 0.0 ? 0 : e->kernel.place[node[a]];
+        weight[a] = e->layer_grain > 0.0 ? 0.0 : g->weight[a];
+    }
+    if (e->layer_grain > 0.0) {
+        place[0] = silt_kernel_layer(&e->kernel, g->x[D - 1], &weight[1]);
+        place[1] = place[0] + 1;
+        weight[0] = 1.0 - weight[1];
+    }
+}
 
 // what does not change within a step, of grains in the water in groups of eight
 static void exchange_pack(silt_exchange *e, double dt) {
@@ -153,9 +167,9 @@ static void exchange_pack(silt_exchange *e, double dt) {
             const silt_exchange_grain *g = &e->grain[e->wet[idle ? e->n_wet - 1 : DRAG_GROUP * m + i]];
             const int *node = e->mesh->cell[g->cell];
             solid[i] = 0.0;
+            exchange_rows(e, g, to->place[i], to->weight[i]);
             for (int a = 0; a <= D; a++) {
-                to->place[i][a] = e->kernel.place[node[a]];
-                to->weight[i][a] = idle ? 0.0 : g->weight[a];
+                to->weight[i][a] = idle ? 0.0 : to->weight[i][a];
                 solid[i] += g->weight[a] * e->solid[node[a]];
             }
             diameter[i] = g->diameter;
@@ -164,6 +178,7 @@ static void exchange_pack(silt_exchange *e, double dt) {
             to->solid[i] = idle ? 0.0 : g->immersed;
             for (int k = 0; k < D; k++) {
                 to->v[k][i] = g->v[k];
+                to->gust[k][i] = e->gusts ? g->gust[k] : 0.0;
                 to->start[k][i] = g->v[k] + (g->held ? 0.0 : dt * e->gravity[k] + to->pace[i] * g->contact[k]);
             }
         }
@@ -206,12 +221,13 @@ EXCHANGE give(const int D, silt_exchange *e, bool renew) {
         exchange_group *g = &e->group[m];
         eight felt[READ_MOST], *v = (eight *)g->v, *start = (eight *)g->start, *free_v = (eight *)g->free;
         eight *effective = (eight *)g->effective, *factor = (eight *)g->factor, out[GIVE_MOST];
+        const eight *gust = (const eight *)g->gust;
         const eight pace = *(eight *)g->pace, solid = *(eight *)g->solid;
         feel(D, e->read, g, felt);
         if (renew) {
             eight u[3];
             for (int k = 0; k < D; k++)
-                u[k] = felt[READ_VELOCITY(k)] - v[k];
+                u[k] = felt[READ_VELOCITY(k)] + gust[k] - v[k];
             const eight square = square_of(D, u);
             silt_drag_group(e->law, (const double(*)[DRAG_GROUP])g->number, (const double *)&square, g->factor);
             *effective = *factor / (1.0 + pace * *factor);
@@ -219,8 +235,8 @@ EXCHANGE give(const int D, silt_exchange *e, bool renew) {
         out[GIVE_DRAG] = *effective;
         for (int k = 0; k < D; k++) {
             free_v[k] = start[k] - pace * solid * felt[READ_GRADIENT(D, k)];
-            const eight force = *effective * (felt[READ_VELOCITY(k)] - free_v[k]), end = free_v[k] + pace * force;
-            out[GIVE_PUSH(k)] = *effective * free_v[k];
+            const eight force = *effective * (felt[READ_VELOCITY(k)] + gust[k] - free_v[k]), end = free_v[k] + pace * force;
+            out[GIVE_PUSH(k)] = *effective * (free_v[k] - gust[k]);
             out[GIVE_FLUX(D, k)] = solid * (v[k] + end) / 2.0;
         }
         if (more)
@@ -250,13 +266,13 @@ EXCHANGE force(const int D, silt_exchange *e, silt_exchange_totals *t) {
     eight drag_sum[3] = {{0.0}}, pressure_sum[3] = {{0.0}}, size = {0.0};
     for (int m = 0; m < e->n_group; m++) {
         const exchange_group *g = &e->group[m];
-        const eight *free_v = (const eight *)g->free;
+        const eight *free_v = (const eight *)g->free, *gust = (const eight *)g->gust;
         const eight effective = *(const eight *)g->effective, solid = *(const eight *)g->solid;
         eight felt[READ_MOST], drag[3], pressure[3];
         feel(D, e->read, g, felt);
         for (int k = 0; k < D; k++) {
             pressure[k] = -solid * felt[READ_GRADIENT(D, k)];
-            drag[k] = effective * (felt[READ_VELOCITY(k)] - free_v[k]);
+            drag[k] = effective * (felt[READ_VELOCITY(k)] + gust[k] - free_v[k]);
             if (more)
                 drag[k] = *(const eight *)e->force.group[m].coefficient * felt[READ_VELOCITY(k)] -
                           *(const eight *)e->force.group[m].push[k];
@@ -365,9 +381,9 @@ static void exchange_update(void *self, const double *velocity, const double *pr
     exchange_smooth(e, e->seen);
     if (silt_forces_sheared(&e->force))
         silt_force_fields(e);
-    memset(e->give, 0, GIVE_FIELDS * ((size_t)e->n_look + 1) * sizeof *e->give);
+    memset(e->give, 0, GIVE_FIELDS * ((size_t)e->n_row + 1) * sizeof *e->give);
     exchange_give(e, e->refresh || fresh);
-    silt_kernel_solve(&e->kernel, GIVE_FIELDS, e->give);
+    silt_kernel_spread(&e->kernel, GIVE_FIELDS, e->give);
     exchange_take(e, velocity, dt);
     if (e->force.def.spin)
         silt_force_couple(e);
@@ -473,7 +489,7 @@ static void exchange_choose_along(silt_exchange *e, double reach) {
 
 static void exchange_choose(silt_exchange *e) {
     exchange_mark(e);
-    if (e->n_wet > 0 && e->layers)
+    if (e->n_wet > 0 && e->layer_grain > 0.0)
         memcpy(e->chosen, e->mesh->wet, (size_t)e->mesh->n_node);
     else if (e->n_wet > 0 && (e->dim == 3 || e->mesh->period[0] > 0.0))
         exchange_choose_along(e, (e->dim == 3 ? sweep_reach : kernel_reach) * e->width);
@@ -516,10 +532,30 @@ static void exchange_look(silt_exchange *e) {
     }
 }
 
+// the same in layers, with room that what is read has no use for yet
+static void exchange_solid_layers(silt_exchange *e) {
+    memset(e->read, 0, ((size_t)e->n_row + 1) * sizeof *e->read);
+    for (int p = 0; p < e->n_wet; p++) {
+        const silt_exchange_grain *g = &e->grain[e->wet[p]];
+        int place[4];
+        double weight[4];
+        exchange_rows(e, g, place, weight);
+        for (int a = 0; a < 2; a++)
+            e->read[place[a]] += weight[a] * g->immersed;
+    }
+    silt_kernel_spread(&e->kernel, 1, e->read);
+    for (int m = 0; m < e->kernel.n_node; m++)
+        e->solid[e->kernel.node[m]] = e->read[m];
+}
+
 // solid fraction
 static void exchange_solid(silt_exchange *e) {
     const silt_mesh *mesh = e->mesh;
     memset(e->solid, 0, (size_t)e->n_node * sizeof *e->solid);
+    if (e->layer_grain > 0.0) {
+        exchange_solid_layers(e);
+        return;
+    }
     for (int p = 0; p < e->n_wet; p++) {
         const silt_exchange_grain *g = &e->grain[e->wet[p]];
         for (int a = 0; a <= e->dim; a++)
@@ -567,10 +603,11 @@ silt_status silt_exchange_place(silt_exchange *e, const silt_nodes *nodes, const
     SILT_RESERVE(e->index, e->node_capacity[8], n);
     SILT_RESERVE(e->placed_x, e->node_capacity[7], D * n);
     exchange_choose(e);
-    SILT_TRY(silt_kernel_build(&e->kernel, mesh, nodes->x, e->chosen, e->width, e->layers, err));
+    SILT_TRY(silt_kernel_build(&e->kernel, mesh, nodes->x, e->chosen, e->width, e->layer_grain, err));
     exchange_look(e);
-    SILT_RESERVE(e->read, e->node_capacity[4], READ_FIELDS(D) * (e->n_look + 1));
-    SILT_RESERVE(e->give, e->node_capacity[5], GIVE_FIELDS * (e->n_look + 1));
+    e->n_row = silt_kernel_rows(&e->kernel) > e->n_look ? silt_kernel_rows(&e->kernel) : e->n_look;
+    SILT_RESERVE(e->read, e->node_capacity[4], READ_FIELDS(D) * (e->n_row + 1));
+    SILT_RESERVE(e->give, e->node_capacity[5], GIVE_FIELDS * (e->n_row + 1));
 
     for (int p = 0; p < e->n_wet; p++)
         e->grain[e->wet[p]].immersed = e->grain[e->wet[p]].solid;

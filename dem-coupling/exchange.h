@@ -25,6 +25,7 @@ typedef struct silt_exchange_grain {
     double contact[3]; // N/m, of contacts in the last step
     double spin[3];    // 1/s; looked at where there is a torque on it
     double gyration;   // m, radius of gyration of the sphere that spins, sqrt(0.4) times its radius
+    double gust[3];    // m/s, added to the water's velocity in the drag
     bool held;         // stays as fast as it is, whatever acts on it
     int cell;          // of the water's mesh, -1: not in the water
     double weight[4];  // barycentric, in that cell
@@ -54,13 +55,14 @@ typedef struct exchange_cell {
 
 /** eight grains in the water: what a step's updates read and write of them */
 typedef struct exchange_group {
-    int place[DRAG_GROUP][4];      // of the corners of the grain's cell, in the kernel's order
+    int place[DRAG_GROUP][4];      // rows of the kernel: the corners of the grain's cell, or the hats around it
     double weight[DRAG_GROUP][4];
     double number[DRAG_NUMBERS][DRAG_GROUP]; // of the drag law
     double pace[DRAG_GROUP];                 // s m/kg, dt/m
     double solid[DRAG_GROUP], v[3][DRAG_GROUP];
     double start[3][DRAG_GROUP];             // m/s, v_free but for the pressure
     double factor[DRAG_GROUP], effective[DRAG_GROUP], free[3][DRAG_GROUP];
+    double gust[3][DRAG_GROUP];              // m/s, with gusts
 } exchange_group;
 
 typedef struct silt_exchange {
@@ -69,7 +71,8 @@ typedef struct silt_exchange {
     double density, viscosity; // of the water
     double gravity[3];
     double width; // m, of the kernel
-    bool layers;  // in the plane: it takes means along x, in layers
+    double layer_grain; // m, their diameter where the kernel takes means along x (space: and y), in layers, else 0
+    bool gusts;   // grains have some
     silt_forces force; // its def; forces besides drag and pressure gradient
     bool refresh; // update also renews the coefficients; the fluid must then read them anew
     // given before prepare
@@ -89,6 +92,7 @@ typedef struct silt_exchange {
     double *read, *give;                         // owned, fields through the kernel, in its order
     struct exchange_cell *cell;                          // owned, cells near to a node that the kernel holds
     int n_wet, *wet;                                     // owned, grains in the water
+    int n_row; // of what the grains read and give
     int n_group;
     struct exchange_group *group; // owned, of those
     uint8_t *chosen;                             // owned, per node: the kernel holds it

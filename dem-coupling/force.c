@@ -71,8 +71,8 @@ void silt_force_fields(silt_exchange *e) {
     silt_forces *f = &e->force;
     const int D = force_dim(e), n_row = force_row(D), n_curl = force_curls(D);
     const double *velocity = (const double *)e->seen;
-    SILT_RESERVE(f->field, f->field_capacity, n_row * (e->n_look + 1));
-    memset(f->field, 0, (size_t)(n_row * (e->n_look + 1)) * sizeof *f->field);
+    SILT_RESERVE(f->field, f->field_capacity, n_row * (e->n_row + 1));
+    memset(f->field, 0, (size_t)(n_row * (e->n_row + 1)) * sizeof *f->field);
     if (f->def.viscous)
         force_stress(e, D, velocity);
     for (int c = 0; c < e->kernel.n_near; c++) {
@@ -98,7 +98,7 @@ void silt_force_fields(silt_exchange *e) {
                 row[n_curl + k] += pull[k];
         }
     }
-    silt_kernel_solve(&e->kernel, n_row, f->field);
+    silt_kernel_sample(&e->kernel, n_row, f->field);
 }
 
 // ---------------------------------------------------------------- eight grains
@@ -143,6 +143,7 @@ VECTOR_INLINE void force_group_give(const int D, silt_exchange *e, int m, const 
     const int n_row = D == 3 ? 8 : 4, n_curl = D == 3 ? 3 : 1;
     const eight pace = *(eight *)g->pace, effective = *(eight *)g->effective, factor = *(eight *)g->factor;
     const eight solid = *(eight *)g->solid, share = *(eight *)to->share, own = *(eight *)to->own, *v = (eight *)g->v;
+    const eight *gust = (const eight *)g->gust;
     const eight rate = *(eight *)to->added / e->force.dt, carried = share / theta, *before = (eight *)to->before;
     eight *free_v = (eight *)g->free, *push = (eight *)to->push, shear[6] = {{0.0}};
     if (e->force.starting)
@@ -161,7 +162,7 @@ VECTOR_INLINE void force_group_give(const int D, silt_exchange *e, int m, const 
         if (def->viscous)
             given[k] = solid * shear[n_curl + k];
         free_v[k] += pace * (given[k] - rate * before[k] / theta);
-        slip[k] = (1.0 - carried) * felt[k] - free_v[k];
+        slip[k] = (1.0 - carried) * felt[k] + gust[k] - free_v[k];
     }
     if (def->lift) {
         force_lift(D, *(eight *)to->lift, slip, shear, pace, factor, lift);
@@ -177,8 +178,8 @@ VECTOR_INLINE void force_group_give(const int D, silt_exchange *e, int m, const 
     const eight coefficient = own * ((1.0 - carried) * effective + rate / theta);
     *(eight *)to->coefficient = out[0] = coefficient;
     for (int k = 0; k < D; k++) {
-        push[k] = own * effective * free_v[k] + rate * (before[k] / theta + free_v[k] - v[k]) - given[k];
-        const eight end = free_v[k] + carried * felt[k] + pace * effective * ((1.0 - carried) * felt[k] - free_v[k]);
+        push[k] = own * effective * (free_v[k] - gust[k]) + rate * (before[k] / theta + free_v[k] - v[k]) - given[k];
+        const eight end = free_v[k] + carried * felt[k] + pace * effective * ((1.0 - carried) * felt[k] + gust[k] - free_v[k]);
         out[1 + k] = push[k];
         out[1 + D + k] = solid * (v[k] + end) / 2.0;
     }
@@ -205,14 +206,14 @@ void silt_force_couple(silt_exchange *e) {
     silt_forces *f = &e->force;
     const int D = force_dim(e), n_row = 4, n_curl = force_curls(D);
     const double *x = (const double *)e->middle;
-    SILT_RESERVE(f->field, f->field_capacity, n_row * (e->n_look + 1));
-    memset(f->field, 0, (size_t)(n_row * (e->n_look + 1)) * sizeof *f->field);
+    SILT_RESERVE(f->field, f->field_capacity, n_row * (e->n_row + 1));
+    memset(f->field, 0, (size_t)(n_row * (e->n_row + 1)) * sizeof *f->field);
     for (int m = 0; m < e->n_group; m++)
         for (int i = 0; i < DRAG_GROUP; i++)
             for (int a = 0; a <= D; a++)
                 for (int k = 0; k < n_curl; k++)
                     f->field[n_row * e->group[m].place[i][a] + k] -= e->group[m].weight[i][a] * f->group[m].torque[k][i];
-    silt_kernel_solve(&e->kernel, n_row, f->field);
+    silt_kernel_spread(&e->kernel, n_row, f->field);
     memset(f->field + n_row * e->kernel.n_node, 0, (size_t)(n_row * (e->n_look + 1 - e->kernel.n_node)) * sizeof *f->field);
     for (int k = e->kernel.n_node; k < e->n_look; k++)
         for (int d = 0; d < D; d++)

@@ -96,3 +96,18 @@ void silt_coupling_walls_go(silt_coupling *c, int n) {
     free(wall);
     free(triangle);
 }
+
+void silt_coupling_sides(silt_coupling *c) {
+    double *lo = &c->dem_def.lo[1], *hi = &c->dem_def.hi[1];
+    for (int i = 0; i < c->walls->count; i++)
+        for (int k = 0; k < 3; k++) {
+            const double y = c->walls->corner[i][k][1];
+            *lo = i + k > 0 ? silt_min(*lo, y) : y;
+            *hi = i + k > 0 ? silt_max(*hi, y) : y;
+        }
+}
+
+double silt_coupling_across(const silt_coupling *c, double y) {
+    const double low = c->dem_def.lo[1], wide = c->dem_def.hi[1] - low;
+    return c->dem_def.across ? y - wide * floor((y - low) / wide) : y;
+}

@@ -74,6 +74,9 @@ awk '/^sought: time.end 0.1,/ { for (k = 1; k < NF; k++) if ($k == "fluid.veloci
     END { exit !(a > 0.4995 && a < 0.5005 && b > 0.999 && b < 1.001) }' "$work/last.say" || fail 'another speed was found'
 expect 0 "$silt" study "$in/seek.yaml" -o "$work/none" -D seek.value=100
 says 'both ends of the range are on the same side'
+# W_c of a bed that begins to leave after a given time: 0.7 J/m3 is exact, the time is met within 1 %
+expect 0 "$silt" study "$2/onset.yaml" -o "$work/onset"
+awk '/^sought: bed.work/ { found = $4 > 0.69 && $4 < 0.71 && $NF == "found" } END { exit !found }' "$work/last.say" || fail 'another W_c was found'
 say 'a search'
 
 # every end

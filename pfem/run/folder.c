@@ -40,7 +40,8 @@ static void out_clear(const char *out) {
                                        "run.h5",
                                        "*.hdf.series",
                                        "*_[0-9][0-9][0-9][0-9][0-9][0-9].hdf",
-                                       "picture_*.png"};
+                                       "picture_*.png",
+                                       "report.html"};
     DIR *folder = opendir(out);
     for (struct dirent *entry; folder && (entry = readdir(folder));)
         for (size_t k = 0; k < sizeof ours / sizeof *ours; k++) {
@@ -106,6 +107,22 @@ char *silt_worker_find(const char *asked) {
     const ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
     self[n > 0 ? n : 0] = 0;
     return worker_near(self);
+}
+
+void silt_run_warn(const silt_run *run, const char *format, ...) {
+    char text[512], *path = silt_text("%s/run.log", run->out);
+    va_list list;
+    va_start(list, format);
+    vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    FILE *log = fopen(path, "a");
+    if (!run->def.quiet)
+        fprintf(stderr, "warning: t = %.6g s: %s\n", run->time, text);
+    if (log) {
+        fprintf(log, "warning: t = %.6g s: %s\n", run->time, text);
+        fclose(log);
+    }
+    free(path);
 }
 
 void silt_folder_remove(const char *path) {

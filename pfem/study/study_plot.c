@@ -1,12 +1,13 @@
 // plots of study.csv through gnuplot: its own data file and script each, so that they can be drawn again by hand
 #include <errno.h>
+#include <fcntl.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "study.h"
 
-static bool row_counts(const study_row *row) { return study_row_status(row) <= RUN_CUT; }
+static bool row_counts(const study_row *row) { return study_row_status(row) <= RUN_WARNED; }
 
 // a title as gnuplot takes it in double quotes
 static void plot_quote(FILE *to, const char *text) {
@@ -122,7 +123,7 @@ static void map_tics(FILE *to, const study *s, char axis, const char *key) {
 }
 
 static bool plot_map(const plot_files *files, const study *s, const study_plot *plot, const study_table *table, const char *x, const char *y) {
-    static const char *const colour[RUN_STATUS_COUNT] = {"#4daf4a", "#a6d96a", "#bdbdbd", "#fdae61", "#ffff66", "#d73027", "#000000", "#984ea3"};
+    static const char *const colour[RUN_STATUS_COUNT] = {"#4daf4a", "#a6d96a", "#80cdc1", "#bdbdbd", "#fdae61", "#ffff66", "#d73027", "#000000", "#984ea3"};
     FILE *data = fopen(files->data, "w");
     int found[RUN_STATUS_COUNT] = {0};
     if (!data)
@@ -161,10 +162,14 @@ static bool plot_map(const plot_files *files, const study *s, const study_plot *
 
 // ---------------------------------------------------------------- gnuplot
 
-static const char *plot_draw(const char *script) {
+// its words go to a log beside the script
+static const char *plot_draw(const char *script, const char *log) {
     const pid_t child = fork();
     int code = 0;
     if (child == 0) {
+        const int to = open(log, O_WRONLY | O_CREAT | O_TRUNC, 0666);
+        if (to >= 0)
+            dup2(to, 2);
         execlp("gnuplot", "gnuplot", script, (char *)NULL);
         _exit(127);
     }
@@ -174,7 +179,7 @@ static const char *plot_draw(const char *script) {
         ;
     if (WIFEXITED(code) && WEXITSTATUS(code) == 127)
         return "gnuplot is not installed (Debian: apt install gnuplot-nox)";
-    return WIFEXITED(code) && WEXITSTATUS(code) == 0 ? NULL : "gnuplot failed";
+    return WIFEXITED(code) && WEXITSTATUS(code) == 0 ? NULL : "gnuplot failed, see gnuplot.log";
 }
 
 // ---------------------------------------------------------------- which
@@ -213,9 +218,11 @@ static const char *plot_one(const study *s, const char *out, const study_table *
         made = (plot->x || range[0]) && (plot->y || range[1]) && plot_map(&files, s, plot, table, plot->x ? plot->x : range[0], plot->y ? plot->y : range[1]);
         break;
     }
-    if (made)
-        missing = plot_draw(files.script);
-    else if (asked)
+    if (made) {
+        char *log = silt_text("%s/gnuplot.log", out);
+        missing = plot_draw(files.script, log);
+        free(log);
+    } else if (asked)
         missing = "there is nothing to draw";
     free(error);
     free(files.data);
