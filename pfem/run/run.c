@@ -456,4 +456,5 @@ void silt_run_free(silt_run *run) {
     free(run->out);
     free(run->worker);
     free(run->log);
+    free(run->trace);
 }
