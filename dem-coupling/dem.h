@@ -53,11 +53,13 @@ typedef struct silt_dem_sphere {
 /** a rigid object as a clump of spheres */
 typedef struct silt_dem_body {
     int n_sphere;
-    const double *sphere; // 3 per sphere: x, y relative to the centroid in the body's frame, radius (z = 0)
+    const double *sphere; // 3 per sphere: x, y relative to the centroid in the body's frame, radius (z = 0); space: 4, x, y, z, radius
     double mass,
         inertia; // kg, kg m2 about z, of the real object in the slab (Ixx, Iyy are made huge: it stays in its plane)
+    double tensor[6]; // space: kg m2, xx, yy, zz, xy, xz, yz in the body's frame
+    double q[4];      // space: orientation at the start (w, x, y, z)
     double x[3], v[3], omega[3]; // centroid, velocity, angular velocity at the start
-    double angle;                // radians about z at the start
+    double angle;                // slab: radians about z at the start
     bool fixed;                  // never moves (its spheres are frozen)
 } silt_dem_body;
 

@@ -42,8 +42,9 @@ typedef struct dem_grain {
 typedef struct dem_body {
     int n_sphere, first; // its spheres in the sphere section, rows first .. first + n_sphere - 1; tag of row k is k + 1
     double mass, inertia, angle;
-    double x[3], v[3], omega[3];
-    double axis[3]; // direction of a line fixed in the body
+    double tensor[6], q[4];    // space: xx, yy, zz, xy, xz, yz of the inertia in its frame; how it is turned at the start
+    double x[3], v[3], omega[3]; // omega of an answer in space: angular momentum
+    double axis[3][3]; // directions of lines fixed in the body, in the plane the first
     double force[3], torque[3];
     int present, pad; // 0: it left the box
 } dem_body;
@@ -77,7 +78,7 @@ typedef struct dem_shared {
     uint64_t wall_motion; // int per wall and triangle: which motion it has, -1: none
     uint64_t motion;      // dem_motion
     uint64_t body;        // dem_body
-    uint64_t body_sphere; // 3 double: x, y from the centroid, radius
+    uint64_t body_sphere; // 3 double: x, y from the centroid, radius; in space 4: x, y, z, radius
     uint64_t remove;      // int: tags
     uint64_t add;         // dem_add
     uint64_t force;       // 3 double per grain of the last answer, in its order
@@ -99,7 +100,7 @@ static inline uint64_t dem_shared_layout(dem_shared *s) {
     DEM_PLACE(wall_motion, s->n_wall + s->n_triangle, int);
     DEM_PLACE(motion, s->n_motion, dem_motion);
     DEM_PLACE(body, s->n_body, dem_body);
-    DEM_PLACE(body_sphere, 3 * s->n_body_sphere, double);
+    DEM_PLACE(body_sphere, (s->dim == 3 ? 4 : 3) * s->n_body_sphere, double);
     DEM_PLACE(remove, s->n_remove, int);
     DEM_PLACE(add, s->n_add, dem_add);
     DEM_PLACE(force, 3 * s->n_force, double);

@@ -9,7 +9,7 @@
 #include "dem.h"
 #include "exchange.h"
 #include "frozen.h"
-#include "shape.h"
+#include "form.h"
 
 /** a discrete element as the coupling knows it; masses and forces per metre of width */
 typedef struct coupling_grain {
@@ -41,7 +41,9 @@ typedef struct coupling_view {
 } coupling_view;
 
 typedef struct coupling_body {
-    silt_outline shape;
+    silt_outline shape;  // in the plane
+    silt_solid form;     // in space: as fine as the shape asks for
+    silt_solid skin;     // with triangles of the water's size
     silt_clump clump;
     bool fixed;
     bool freed; // its release has come
@@ -136,6 +138,15 @@ void silt_coupling_twist(silt_coupling *coupling);
 bool silt_coupling_leaves(const silt_coupling *coupling, const double *a, const double *b, double near);
 /** a grain that LIGGGHTS no longer has: true when it went over an outlet; it is lost otherwise */
 bool silt_coupling_left_domain(const silt_coupling *coupling, const coupling_grain *grain);
+// bodies.c
+/** Surfaces, clumps, masses and places of the scene's bodies. Errors (SILT_INPUT): a shape that cannot be, that is too thin for the
+ * water's mesh, that lies behind a wall or in another body. */
+silt_status silt_coupling_bodies(silt_coupling *coupling, silt_error *err);
+void silt_coupling_bodies_clear(silt_coupling *coupling);
+/** tells the discrete elements of them */
+silt_status silt_coupling_send_bodies(silt_coupling *coupling, silt_error *err);
+/** distance from a point to body i; beyond `far` only a lower bound of it */
+double silt_coupling_body_distance(const silt_coupling *coupling, int i, const double *x, double far);
 // walls.c
 void silt_coupling_walls(silt_coupling *coupling);       /**< which of them move, and where all are */
 void silt_coupling_walls_stand(silt_coupling *coupling); /**< where the walls are now is where LIGGGHTS has them */

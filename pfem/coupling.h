@@ -54,7 +54,8 @@ typedef struct silt_coupling_type {
 
     /** of the last load and the last substeps */
     void (*exchanged)(const silt_coupling *coupling, silt_exchanged *exchanged);
-    /** Points on a body's outline at spacing h, corners kept, in the body's frame; @return how many (none written beyond capacity) */
+    /** Points on a body's outline at spacing h, corners kept, in the body's frame, dim numbers each; in space those of its surface,
+     * which has the local size. @return how many (none written beyond capacity) */
     int (*outline)(const silt_coupling *coupling, int body, double h, double *point, int capacity);
 
     /** true when a sphere fits there: overlap with grains, frozen spheres, bodies and walls at most 1 % of its radius.

@@ -83,9 +83,14 @@ void silt_run_ledger(silt_run *run) {
         ledger->fluid_volume -= run->waiting[k].mass / scene->bed.density;
     ledger->fluid_volume += ledger->flying_volume;
     ledger->fluid_mass = rho * ledger->fluid_volume;
-    ledger->volume_owed = 0;
-    for (int i = 0; i < nodes->count; i++)
-        ledger->volume_owed += run->mesh.wet[i] ? nodes->debt[i] : 0;
+    ledger->volume_owed = ledger->owed_energy = 0;
+    for (int i = 0; i < nodes->count; i++) {
+        if (!run->mesh.wet[i] || nodes->debt[i] == 0)
+            continue;
+        const double *v = nodes->v + D * i;
+        ledger->volume_owed += nodes->debt[i];
+        ledger->owed_energy += rho * nodes->debt[i] * (0.5 * silt_dot(D, v, v) - silt_dot(D, nodes->x + D * i, scene->gravity));
+    }
     if (scene->fluid.on)
         silt_water_moment(nodes, &run->mesh, run->drag ? run->drag->solid : NULL, rho, (const double[3]){0}, ledger->angular_momentum);
     ledger->y_plus = run->fluid.law.n_point ? run->fluid.law.y_plus[1] : NAN;

@@ -4,6 +4,7 @@
 #include "bed_law.h"
 #include "run.h"
 
+#define VOLUME_OFF 0.05    // largest share of the water that may be off without a word
 #define BED_Y_PLUS 5.0     // largest height of the first cell in wall units: the viscous sublayer
 #define PRESSURE_SLOPE 0.2 // largest share by which output carries the pressure on to the end of the step
 
@@ -218,16 +219,8 @@ static void bed_resolved(silt_run *run) {
     if (run->bed_told || run->bed.y_plus <= BED_Y_PLUS)
         return;
     run->bed_told = true;
-    char *path = silt_text("%s/run.log", run->out);
-    FILE *log = fopen(path, "a");
-    for (int k = 0; k < 2; k++)
-        if (k == 0 ? !run->def.quiet : log != NULL)
-            fprintf(k == 0 ? stderr : log, "warning: t = %.6g s: the first cell over the bed is %.3g wall units high (y+), the gradient of bed.shear "
-                                           "needs at most %g: the shear is too low; finer water at the bed, or bed.shear: log-law\n",
-                    run->time, run->bed.y_plus, BED_Y_PLUS);
-    if (log)
-        fclose(log);
-    free(path);
+    silt_run_warn(run, "the first cell over the bed is %.3g wall units high (y+), the gradient of bed.shear needs at most %g: the shear is "
+                       "too low; finer water at the bed, or bed.shear: log-law", run->bed.y_plus, BED_Y_PLUS);
 }
 
 static void bed_step(silt_run *run) {
@@ -348,6 +341,16 @@ silt_status silt_run_measure(silt_run *run, silt_error *err) {
     return SILT_OK;
 }
 
+// water that is owed is not lost, but where there is so much of it the cells are too large for what it does: told once a run
+static void volume_held(silt_run *run) {
+    const silt_ledger *ledger = &run->ledger;
+    if (run->volume_told || !run->scene->fluid.on || !(fabs(ledger->volume_error) > VOLUME_OFF))
+        return;
+    run->volume_told = true;
+    silt_run_warn(run, "the water's volume is off by %.3g %%, %.3g m3 of it are owed and come back later: the cells are too large for what the water "
+                       "does there; smaller fluid.size", 100 * ledger->volume_error, ledger->volume_owed);
+}
+
 silt_status silt_run_output(silt_run *run, silt_error *err) {
     // a row cannot hold the time that writing it takes: it shows that of the row before
     run_phases(run);
@@ -377,6 +380,7 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
 silt_status silt_run_advance(silt_run *run, silt_error *err) {
     SILT_TRY(run_step(run, err));
     SILT_TRY(silt_run_measure(run, err));
+    volume_held(run);
     return silt_run_output(run, err);
 }
 

@@ -62,6 +62,7 @@ struct silt_run {
     double *grown_area;    // owned
     int64_t bed_revision;  // that nodes and coupling know
     bool bed_told;         // that the shear on the bed is not resolved
+    bool volume_told;      // that much of the water's volume is off
     double wear_ahead;     // s, that the bed was worn for and the water has still to go: of steps cut after that
 
     // clocks: time = frame * output + offset, with offset = tick * step of the coupling when there is one
@@ -85,7 +86,7 @@ struct silt_run {
     int n_body_before, body_before_capacity;
     struct silt_body *body_before; // owned, poses at the start of the step
     int body_load_capacity;
-    double (*body_load)[3];        // owned, N and N m per m, force and torque of the step before
+    double (*body_load)[6];        // owned, N and N m per m, force and torque of the step before
     double *x_old;   // owned, 2 per node, positions at the start of the step
     double *v_old, *debt_old; // owned, 2 and 1 per node, velocities and debts at the start of the step
     int *wall_before;  // owned, first wall of every node before contact
@@ -175,6 +176,8 @@ void silt_run_feed(silt_run *run, double dt); // what inlets bring in dt joins t
 silt_status silt_folder_prepare(const char *out, bool force, int *lock, silt_error *err);
 /** one run at a time in a folder; the lock ends with the process at the latest */
 silt_status silt_folder_lock(const char *out, int *lock, silt_error *err);
+/** a warning on stderr, unless the run is quiet, and in run.log, with the time */
+void silt_run_warn(const silt_run *run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void silt_folder_remove(const char *path); // the folder and the files in it
 char *silt_folder_default(const silt_scene *scene); // the scene's folder name plus .out, in the current folder; owned by the caller
 char *silt_worker_find(const char *asked);          // path of silt-dem; owned by the caller
