@@ -109,6 +109,20 @@ static void checkpoint_rows_fill(checkpoint_rows *r, bool out, silt_coupling *c)
         checkpoint_body_row(out, r->body + (size_t)i * BODY_DOUBLES, &c->bodies->body[i]);
 }
 
+// three numbers a grain, where there are gusts
+static silt_status checkpoint_gusts(silt_coupling *c, bool out, silt_store *store, silt_error *err) {
+    const size_t n = 3 * (size_t)c->n_grain;
+    double *gust = silt_alloc(n + 1, sizeof *gust);
+    for (int i = 0; i < c->n_grain && out; i++)
+        memcpy(gust + 3 * i, c->grain[i].gust, sizeof c->grain[i].gust);
+    const silt_status status = out ? silt_store_put(store, "coupling/gust", STORE_DOUBLE, n, gust, err)
+                                   : silt_store_take(store, "coupling/gust", STORE_DOUBLE, n, gust, err);
+    for (int i = 0; i < c->n_grain && !out && status == SILT_OK; i++)
+        memcpy(c->grain[i].gust, gust + 3 * i, sizeof c->grain[i].gust);
+    free(gust);
+    return status;
+}
+
 silt_status silt_checkpoint_save(silt_coupling *c, silt_store *store, silt_error *err) {
     checkpoint_rows r = {.number = {c->n_grain, c->frozen.count, c->bodies->count, c->next_id, c->left_count},
                          .left = {c->left_mass, c->left_rest, c->left_solid}};
@@ -120,6 +134,10 @@ silt_status silt_checkpoint_save(silt_coupling *c, silt_store *store, silt_error
     if (status == SILT_OK && c->n_motion > 0)
         status = silt_store_put(store, "coupling/wall", STORE_DOUBLE, sizeof *c->centre / sizeof(double) * (size_t)c->n_motion, c->centre,
                                 err);
+    if (status == SILT_OK && c->exchange.gusts)
+        status = checkpoint_gusts(c, true, store, err);
+    if (status == SILT_OK)
+        status = silt_coupling_freed(c, true, store, err);
     checkpoint_rows_clear(&r);
     return status;
 }
@@ -135,6 +153,8 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     if (status == SILT_OK && c->n_motion > 0)
         status = silt_store_take(store, "coupling/wall", STORE_DOUBLE, sizeof *c->centre / sizeof(double) * (size_t)c->n_motion,
                                  c->towards, err);
+    if (status == SILT_OK)
+        status = silt_coupling_freed(c, false, store, err);
     if (status != SILT_OK)
         goto done;
     silt_coupling_walls_stand(c);
@@ -161,6 +181,8 @@ silt_status silt_checkpoint_load(silt_coupling *c, silt_store *store, silt_error
     }
     for (int i = 0; i < c->frozen.count; i++)
         c->frozen.sphere[i].sent = true;
+    if (c->exchange.gusts)
+        status = checkpoint_gusts(c, false, store, err);
 done:
     checkpoint_rows_clear(&r);
     return status;

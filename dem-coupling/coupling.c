@@ -4,7 +4,6 @@
 
 static const double parcel_least = 0.4, parcel_most = 2.0; // radii of parcels in contact, times that of grains.parcel
 static const double parcel_usual = 0.75;                   // radius that the time step is chosen for
-static const double clump_spacing = 0.3;                   // between a body's spheres, times their radius
 static const double room_overlap = 0.01;                   // of the radius
 static const double heap_porosity = 0.4;                   // of what fills the regions, when it has settled
 static const double period_share = 3.2;                    // slab thickness over the largest sphere's diameter
@@ -33,38 +32,6 @@ double silt_coupling_burden(const silt_coupling *c, const coupling_grain *g) {
         return 1.0;
     double sphere = 4.0 / 3.0 * M_PI * crumb * crumb * crumb * g->mass / g->solid;
     return silt_max(1.0, sphere / (g->mass * c->width));
-}
-
-// bodies' outlines and clumps, per metre of width
-static silt_status coupling_shapes(silt_coupling *c, silt_error *err) {
-    const silt_scene *scene = c->scene;
-    size_t n = (size_t)scene->n_body;
-    c->body = silt_alloc(n, sizeof *c->body);
-    c->body_force = silt_alloc(3 * n, sizeof(double));
-    c->body_torque = silt_alloc(3 * n, sizeof(double));
-    c->bodies = silt_alloc(1, sizeof *c->bodies);
-    c->bodies->body = silt_alloc(n, sizeof *c->bodies->body);
-    c->bodies->count = scene->n_body;
-    for (int i = 0; i < scene->n_body; i++) {
-        const silt_body_def *def = &scene->body[i];
-        coupling_body *body = &c->body[i];
-        struct silt_body *state = &c->bodies->body[i];
-        SILT_TRY(silt_outline_create(&body->shape, def, err));
-        silt_clump_create(&body->clump, &body->shape, 0.0, clump_spacing);
-        body->fixed = def->motion == MOTION_FIXED;
-        for (int k = 0; k < 2; k++) {
-            state->x[k] = def->at[k];
-            state->v[k] = body->fixed ? 0.0 : def->velocity[k];
-        }
-        state->q[0] = cos(def->angle * M_PI / 360.0);
-        state->q[3] = sin(def->angle * M_PI / 360.0);
-        state->mass = def->density * body->shape.area;
-        state->inertia[2] = def->density * body->shape.inertia;
-        state->volume = body->shape.area;
-        state->n_point = body->shape.n_point;
-        state->point = body->shape.point;
-    }
-    return SILT_OK;
 }
 
 // widths, radii, time step and everything else that the worker is told once
@@ -138,6 +105,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
                                              grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     memcpy(c->exchange.gravity, scene->gravity, sizeof c->exchange.gravity);
     c->exchange.layers = grains->kernel_layers;
+    c->exchange.gusts = grains->gusts > 0.0;
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 
     const bool space = c->dim == 3, periodic = scene->period[0] < scene->period[1];
@@ -151,6 +119,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .way_lo = {def->way_lo[0], def->way_lo[1], def->way_lo[2]},
         .way_hi = {def->way_hi[0], def->way_hi[1], def->way_hi[2]},
         .periodic = periodic,
+        .across = grains->across,
         .period = period_share * 2.0 * largest,
         .gravity = {scene->gravity[0], scene->gravity[1], scene->gravity[2]},
         .youngs_modulus = contact->youngs_modulus,
@@ -172,6 +141,8 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .min_radius = smallest,
         .no_contacts = !scene->bed.on || !scene->bed.deposition,
     };
+    if (grains->across)
+        silt_coupling_sides(c);
 }
 
 // ---------------------------------------------------------------- grains
@@ -294,17 +265,6 @@ static void coupling_deposit(silt_coupling *c, int grain) {
 
 // ---------------------------------------------------------------- room
 
-// distance from a point to a body; beyond `far` only a lower bound of it
-static double coupling_body_distance(const silt_coupling *c, int i, const double x[2], double far) {
-    const struct silt_body *b = &c->bodies->body[i];
-    double d[2] = {x[0] - b->x[0], x[1] - b->x[1]}, bound = hypot(d[0], d[1]) - c->body[i].shape.radius;
-    if (bound > far)
-        return bound;
-    double angle = 2.0 * atan2(b->q[3], b->q[0]);
-    double local[2] = {cos(angle) * d[0] + sin(angle) * d[1], cos(angle) * d[1] - sin(angle) * d[0]};
-    return silt_outline_distance(&c->body[i].shape, local);
-}
-
 static double coupling_wall_distance(const silt_walls *walls, int i, const double x[2]) {
     const double *a = walls->from[i], *b = walls->to[i], e[2] = {b[0] - a[0], b[1] - a[1]}, d[2] = {x[0] - a[0], x[1] - a[1]};
     const double t = silt_clamp((e[0] * d[0] + e[1] * d[1]) / (e[0] * e[0] + e[1] * e[1]), 0.0, 1.0);
@@ -323,7 +283,7 @@ static double coupling_gap(const void *context, const double *x) {
         if (!c->grain[i].gone)
             gap = silt_min(gap, coupling_apart(c, x, c->grain[i].x) - c->grain[i].radius);
     for (int i = 0; i < c->bodies->count; i++)
-        gap = silt_min(gap, coupling_body_distance(c, i, x, gap));
+        gap = silt_min(gap, silt_coupling_body_distance(c, i, x, gap));
     return gap;
 }
 
@@ -355,13 +315,14 @@ static void coupling_bed_changed(silt_coupling *c, const silt_bed *bed) {
 static int coupling_locate(silt_coupling *c, coupling_grain *g, const silt_nodes *nodes, const silt_mesh *mesh,
                            bool *located, double *weight) {
     int cell = -1;
+    double x[3] = {g->x[0], silt_coupling_across(c, g->x[1]), g->x[2]};
     if (g->near >= 0 && g->near < mesh->n_node && mesh->wet[g->near])
-        cell = silt_locate_from(mesh, nodes->x, g->x, mesh->node_cell[mesh->node_cell_start[g->near]], weight);
+        cell = silt_locate_from(mesh, nodes->x, x, mesh->node_cell[mesh->node_cell_start[g->near]], weight);
     if (cell < 0) {
         if (!*located)
             silt_locator_build(&c->locator, mesh, nodes->x, c->scene->fluid.size);
         *located = true;
-        cell = silt_locate(&c->locator, mesh, nodes->x, g->x, weight);
+        cell = silt_locate(&c->locator, mesh, nodes->x, x, weight);
     }
     g->near = cell >= 0 ? mesh->cell[cell][0] : -1;
     return cell;
@@ -390,6 +351,7 @@ static bool coupling_find(silt_coupling *c, const silt_nodes *nodes, const silt_
         memcpy(to->spin, g->omega, sizeof to->spin);
         to->gyration = sqrt(0.4) * g->radius;
         to->held = g->fixed;
+        memcpy(to->gust, g->gust, sizeof to->gust);
         memset(to->force, 0, sizeof to->force);
         memset(to->torque, 0, sizeof to->torque);
         to->cell = coupling_locate(c, g, nodes, mesh, &located, to->weight);
@@ -520,6 +482,7 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     c->elapsed = n * c->step;
     if (n > 0)
         silt_coupling_walls_go(c, n);
+    silt_coupling_guide(c, n);
     return silt_dem_start(c->dem, n, c->force, c->body_force, c->body_torque, err);
 }
 
@@ -569,6 +532,7 @@ static silt_status coupling_complete(const silt_coupling *c, const silt_dem_stat
 static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
     SILT_TRY(silt_dem_wait(c->dem, err));
     const silt_dem_state *state = silt_dem_state_now(c->dem);
+    silt_coupling_guided(c);
     SILT_TRY(coupling_complete(c, state, err));
     memset(c->contact, 0, sizeof c->contact);
     if (c->elapsed > 0.0)
@@ -617,32 +581,14 @@ static silt_status coupling_create(silt_coupling **coupling, const silt_coupling
     c->dim = def->scene->dimension == 3 ? 3 : 2;
     c->next_id = c->sent_id = 1;
     c->view = silt_alloc(1, sizeof *c->view);
-    SILT_TRY(coupling_shapes(c, err));
+    SILT_TRY(silt_coupling_bodies(c, err));
     coupling_measure(c, def);
-    return SILT_OK;
-}
-
-static silt_status coupling_send_bodies(silt_coupling *c, silt_error *err) {
-    for (int i = 0; i < c->bodies->count; i++) {
-        const struct silt_body *b = &c->bodies->body[i];
-        const silt_clump *clump = &c->body[i].clump;
-        silt_dem_body body = {.n_sphere = clump->n_sphere,
-                              .sphere = clump->sphere,
-                              .mass = b->mass * c->width,
-                              .inertia = b->inertia[2] * c->width,
-                              .angle = 2.0 * atan2(b->q[3], b->q[0]),
-                              .fixed = c->body[i].fixed};
-        memcpy(body.x, b->x, sizeof body.x);
-        memcpy(body.v, b->v, sizeof body.v);
-        memcpy(body.omega, b->w, sizeof body.omega);
-        SILT_TRY(silt_dem_add_body(c->dem, &body, err));
-    }
     return SILT_OK;
 }
 
 static silt_status coupling_open_dem(silt_coupling *c, silt_error *err) {
     SILT_TRY(silt_dem_open(&c->dem, &c->dem_def, err));
-    return coupling_send_bodies(c, err);
+    return silt_coupling_send_bodies(c, err);
 }
 
 static silt_status coupling_recover(silt_coupling *c, silt_error *err) {
@@ -704,12 +650,8 @@ static void coupling_close(silt_coupling **coupling) {
     silt_dem_close(&c->dem);
     free(c->wall);
     free(c->triangle);
-    for (int i = 0; i < c->bodies->count; i++) {
-        silt_outline_clear(&c->body[i].shape);
-        silt_clump_clear(&c->body[i].clump);
-    }
-    free(c->bodies->body);
-    free(c->bodies);
+    free(c->guide);
+    silt_coupling_bodies_clear(c);
     coupling_view *w = c->view;
     void *owned[] = {w->contact, w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
@@ -734,7 +676,12 @@ static silt_body_state *coupling_bodies(const silt_coupling *c) { return c->bodi
 static int coupling_process(const silt_coupling *c) { return silt_dem_process(c->dem); }
 
 static int coupling_outline(const silt_coupling *c, int body, double h, double *point, int capacity) {
-    return silt_outline_nodes(&c->body[body].shape, h, point, capacity);
+    const silt_solid *skin = &c->body[body].skin;
+    if (c->dim == 2)
+        return silt_outline_nodes(&c->body[body].shape, h, point, capacity);
+    if (point != NULL)
+        memcpy(point, skin->point, (size_t)(capacity < skin->n_point ? capacity : skin->n_point) * sizeof *skin->point);
+    return skin->n_point;
 }
 
 static void coupling_left(const silt_coupling *c, double *mass, double *solid, int64_t *count) {
@@ -775,6 +722,7 @@ const silt_coupling_type silt_coupling_dem = {
     .prepare = coupling_prepare,
     .load = coupling_load,
     .walk = silt_coupling_walk,
+    .gusts = silt_coupling_gusts,
     .exchanged = coupling_exchanged,
     .outline = coupling_outline,
     .room = coupling_room,

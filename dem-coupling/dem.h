@@ -19,6 +19,7 @@ typedef struct silt_dem_def {
     double lo[3], hi[3]; // the box (slab: in x and y); a sphere that leaves it is gone
     double way_lo[3], way_hi[3]; // m, what walls that move span in all their motion
     bool periodic;       // in x: what leaves the box there comes in at the other end
+    bool across;         // space: in y too
     double period;       // m, slab: periodic length in z (at least 3 times the largest sphere's diameter)
     double gravity[3];
     double wall_modulus; // Pa, of the walls; 0: youngs_modulus
@@ -52,11 +53,13 @@ typedef struct silt_dem_sphere {
 /** a rigid object as a clump of spheres */
 typedef struct silt_dem_body {
     int n_sphere;
-    const double *sphere; // 3 per sphere: x, y relative to the centroid in the body's frame, radius (z = 0)
+    const double *sphere; // 3 per sphere: x, y relative to the centroid in the body's frame, radius (z = 0); space: 4, x, y, z, radius
     double mass,
         inertia; // kg, kg m2 about z, of the real object in the slab (Ixx, Iyy are made huge: it stays in its plane)
+    double tensor[6]; // space: kg m2, xx, yy, zz, xy, xz, yz in the body's frame
+    double q[4];      // space: orientation at the start (w, x, y, z)
     double x[3], v[3], omega[3]; // centroid, velocity, angular velocity at the start
-    double angle;                // radians about z at the start
+    double angle;                // slab: radians about z at the start
     bool fixed;                  // never moves (its spheres are frozen)
 } silt_dem_body;
 
@@ -96,6 +99,10 @@ void silt_dem_twist(silt_dem *dem, const double *torque);
  * plane from x to y, in space from x to z; and where they stand at the end of the next run, the numbers of the definition's walls or
  * triangles. */
 void silt_dem_move_walls(silt_dem *dem, const double (*rate)[4], const double *wall);
+/** What guides bodies and walls in the next run, as guide.h has it; borrowed until then */
+void silt_dem_guide(silt_dem *dem, const void *guide, size_t size);
+/** the same after the run, with the worker's answers; NULL: there was none */
+const struct dem_guide *silt_dem_guided(const silt_dem *dem);
 /** Steps aside before the next run, 3 per grain in the order of the last state, m; borrowed until then */
 void silt_dem_shift(silt_dem *dem, const double *shift);
 /** The next run may go on from where the last one ended, with its neighbour lists and without a set-up. A run is set up all the

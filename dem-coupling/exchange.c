@@ -164,6 +164,7 @@ static void exchange_pack(silt_exchange *e, double dt) {
             to->solid[i] = idle ? 0.0 : g->immersed;
             for (int k = 0; k < D; k++) {
                 to->v[k][i] = g->v[k];
+                to->gust[k][i] = e->gusts ? g->gust[k] : 0.0;
                 to->start[k][i] = g->v[k] + (g->held ? 0.0 : dt * e->gravity[k] + to->pace[i] * g->contact[k]);
             }
         }
@@ -206,12 +207,13 @@ EXCHANGE give(const int D, silt_exchange *e, bool renew) {
         exchange_group *g = &e->group[m];
         eight felt[READ_MOST], *v = (eight *)g->v, *start = (eight *)g->start, *free_v = (eight *)g->free;
         eight *effective = (eight *)g->effective, *factor = (eight *)g->factor, out[GIVE_MOST];
+        const eight *gust = (const eight *)g->gust;
         const eight pace = *(eight *)g->pace, solid = *(eight *)g->solid;
         feel(D, e->read, g, felt);
         if (renew) {
             eight u[3];
             for (int k = 0; k < D; k++)
-                u[k] = felt[READ_VELOCITY(k)] - v[k];
+                u[k] = felt[READ_VELOCITY(k)] + gust[k] - v[k];
             const eight square = square_of(D, u);
             silt_drag_group(e->law, (const double(*)[DRAG_GROUP])g->number, (const double *)&square, g->factor);
             *effective = *factor / (1.0 + pace * *factor);
@@ -219,8 +221,8 @@ EXCHANGE give(const int D, silt_exchange *e, bool renew) {
         out[GIVE_DRAG] = *effective;
         for (int k = 0; k < D; k++) {
             free_v[k] = start[k] - pace * solid * felt[READ_GRADIENT(D, k)];
-            const eight force = *effective * (felt[READ_VELOCITY(k)] - free_v[k]), end = free_v[k] + pace * force;
-            out[GIVE_PUSH(k)] = *effective * free_v[k];
+            const eight force = *effective * (felt[READ_VELOCITY(k)] + gust[k] - free_v[k]), end = free_v[k] + pace * force;
+            out[GIVE_PUSH(k)] = *effective * (free_v[k] - gust[k]);
             out[GIVE_FLUX(D, k)] = solid * (v[k] + end) / 2.0;
         }
         if (more)
@@ -250,13 +252,13 @@ EXCHANGE force(const int D, silt_exchange *e, silt_exchange_totals *t) {
     eight drag_sum[3] = {{0.0}}, pressure_sum[3] = {{0.0}}, size = {0.0};
     for (int m = 0; m < e->n_group; m++) {
         const exchange_group *g = &e->group[m];
-        const eight *free_v = (const eight *)g->free;
+        const eight *free_v = (const eight *)g->free, *gust = (const eight *)g->gust;
         const eight effective = *(const eight *)g->effective, solid = *(const eight *)g->solid;
         eight felt[READ_MOST], drag[3], pressure[3];
         feel(D, e->read, g, felt);
         for (int k = 0; k < D; k++) {
             pressure[k] = -solid * felt[READ_GRADIENT(D, k)];
-            drag[k] = effective * (felt[READ_VELOCITY(k)] - free_v[k]);
+            drag[k] = effective * (felt[READ_VELOCITY(k)] + gust[k] - free_v[k]);
             if (more)
                 drag[k] = *(const eight *)e->force.group[m].coefficient * felt[READ_VELOCITY(k)] -
                           *(const eight *)e->force.group[m].push[k];

@@ -25,6 +25,7 @@ typedef struct silt_exchange_grain {
     double contact[3]; // N/m, of contacts in the last step
     double spin[3];    // 1/s; looked at where there is a torque on it
     double gyration;   // m, radius of gyration of the sphere that spins, sqrt(0.4) times its radius
+    double gust[3];    // m/s, added to the water's velocity in the drag
     bool held;         // stays as fast as it is, whatever acts on it
     int cell;          // of the water's mesh, -1: not in the water
     double weight[4];  // barycentric, in that cell
@@ -61,6 +62,7 @@ typedef struct exchange_group {
     double solid[DRAG_GROUP], v[3][DRAG_GROUP];
     double start[3][DRAG_GROUP];             // m/s, v_free but for the pressure
     double factor[DRAG_GROUP], effective[DRAG_GROUP], free[3][DRAG_GROUP];
+    double gust[3][DRAG_GROUP];              // m/s, with gusts
 } exchange_group;
 
 typedef struct silt_exchange {
@@ -69,7 +71,8 @@ typedef struct silt_exchange {
     double density, viscosity; // of the water
     double gravity[3];
     double width; // m, of the kernel
-    bool layers;  // in the plane: it takes means along x, in layers
+    bool layers;  // it takes means along x (space: and y), in layers
+    bool gusts;   // grains have some
     silt_forces force; // its def; forces besides drag and pressure gradient
     bool refresh; // update also renews the coefficients; the fluid must then read them anew
     // given before prepare

@@ -143,6 +143,7 @@ VECTOR_INLINE void force_group_give(const int D, silt_exchange *e, int m, const 
     const int n_row = D == 3 ? 8 : 4, n_curl = D == 3 ? 3 : 1;
     const eight pace = *(eight *)g->pace, effective = *(eight *)g->effective, factor = *(eight *)g->factor;
     const eight solid = *(eight *)g->solid, share = *(eight *)to->share, own = *(eight *)to->own, *v = (eight *)g->v;
+    const eight *gust = (const eight *)g->gust;
     const eight rate = *(eight *)to->added / e->force.dt, carried = share / theta, *before = (eight *)to->before;
     eight *free_v = (eight *)g->free, *push = (eight *)to->push, shear[6] = {{0.0}};
     if (e->force.starting)
@@ -161,7 +162,7 @@ VECTOR_INLINE void force_group_give(const int D, silt_exchange *e, int m, const 
         if (def->viscous)
             given[k] = solid * shear[n_curl + k];
         free_v[k] += pace * (given[k] - rate * before[k] / theta);
-        slip[k] = (1.0 - carried) * felt[k] - free_v[k];
+        slip[k] = (1.0 - carried) * felt[k] + gust[k] - free_v[k];
     }
     if (def->lift) {
         force_lift(D, *(eight *)to->lift, slip, shear, pace, factor, lift);
@@ -177,8 +178,8 @@ VECTOR_INLINE void force_group_give(const int D, silt_exchange *e, int m, const 
     const eight coefficient = own * ((1.0 - carried) * effective + rate / theta);
     *(eight *)to->coefficient = out[0] = coefficient;
     for (int k = 0; k < D; k++) {
-        push[k] = own * effective * free_v[k] + rate * (before[k] / theta + free_v[k] - v[k]) - given[k];
-        const eight end = free_v[k] + carried * felt[k] + pace * effective * ((1.0 - carried) * felt[k] - free_v[k]);
+        push[k] = own * effective * (free_v[k] - gust[k]) + rate * (before[k] / theta + free_v[k] - v[k]) - given[k];
+        const eight end = free_v[k] + carried * felt[k] + pace * effective * ((1.0 - carried) * felt[k] + gust[k] - free_v[k]);
         out[1 + k] = push[k];
         out[1 + D + k] = solid * (v[k] + end) / 2.0;
     }

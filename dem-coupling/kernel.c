@@ -33,8 +33,9 @@ static double kernel_triangle(const double c[12], double scale, double edge[3]) 
     return twice / 2.0;
 }
 
-// lumped volumes, and b^2/4 K cell by cell
-static silt_status kernel_measure(silt_kernel *kernel, const silt_mesh *mesh, const double *x, double width, silt_error *err) {
+// Lumped volumes, and b^2/4 K cell by cell. Means over layers take no K: a flat cell at the surface that turned over between two meshings
+// is as good to them as any.
+static silt_status kernel_measure(silt_kernel *kernel, const silt_mesh *mesh, const double *x, double width, bool layers, silt_error *err) {
     const int D = kernel->dim, n_edge = D == 3 ? 6 : 3;
     SILT_RESERVE(kernel->volume, kernel->node_capacity[2], mesh->n_node);
     SILT_RESERVE(kernel->area, kernel->cell_capacity[1], mesh->n_cell);
@@ -45,9 +46,10 @@ static silt_status kernel_measure(silt_kernel *kernel, const silt_mesh *mesh, co
         double c[12], *edge = kernel->edge + n_edge * e;
         silt_cell_corners(mesh, x, node, c);
         const double volume = D == 3 ? silt_sweep_cell(c, width * width / 4.0, edge) : kernel_triangle(c, width * width / 4.0, edge);
-        if (!(volume > 0.0))
-            return silt_fail(err, SILT_FAILED, "porosity kernel: water cell %d (nodes %d %d %d%s) near (%g, %g) has the %s %g m%d, must be above 0",
-                             e, node[0], node[1], node[2], D == 3 ? ", ..." : "", c[0], c[1], D == 3 ? "volume" : "area", volume, D);
+        if (!(volume > 0.0) && !layers)
+            return silt_fail(err, SILT_FAILED, "porosity kernel: water cell %d (nodes %d %d %d%s) near (%g, %g, %g) has the %s %g m%d, must be above 0",
+                             e, node[0], node[1], node[2], D == 3 ? ", ..." : "", c[0], c[1], D == 3 ? c[2] : 0.0, D == 3 ? "volume" : "area",
+                             volume, D);
         kernel->area[e] = volume;
         for (int a = 0; a <= D; a++)
             kernel->volume[node[a]] += volume / (D + 1);
@@ -59,11 +61,11 @@ static silt_status kernel_measure(silt_kernel *kernel, const silt_mesh *mesh, co
 
 // hats over the heights of the kernel's nodes, at multiples of their width: the same ones whatever nodes there are
 static void kernel_layers(silt_kernel *kernel, const double *x, double width) {
-    const int n = kernel->n_node;
+    const int n = kernel->n_node, D = kernel->dim, up = D - 1;
     double low = HUGE_VAL, high = -HUGE_VAL;
     for (int k = 0; k < n; k++) {
-        low = silt_min(low, x[2 * kernel->node[k] + 1]);
-        high = silt_max(high, x[2 * kernel->node[k] + 1]);
+        low = silt_min(low, x[D * kernel->node[k] + up]);
+        high = silt_max(high, x[D * kernel->node[k] + up]);
     }
     const double first = n > 0 ? floor(low / width) : 0.0;
     kernel->n_layer = n > 0 ? (int)(floor(high / width) - first) + 2 : 1;
@@ -73,7 +75,7 @@ static void kernel_layers(silt_kernel *kernel, const double *x, double width) {
     SILT_RESERVE(kernel->sum, kernel->layer_capacity[3], kernel->n_layer);
     memset(kernel->hat, 0, (size_t)kernel->n_layer * sizeof *kernel->hat);
     for (int k = 0; k < n; k++) {
-        const double y = x[2 * kernel->node[k] + 1] / width - first, volume = kernel->volume[kernel->node[k]];
+        const double y = x[D * kernel->node[k] + up] / width - first, volume = kernel->volume[kernel->node[k]];
         kernel->layer[k] = (int)y;
         kernel->above[k] = y - (int)y;
         kernel->hat[(int)y] += (1.0 - kernel->above[k]) * volume;
@@ -112,16 +114,16 @@ silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const 
     kernel->dim = mesh->dim == 3 ? 3 : 2;
     kernel->n_layer = 0;
     kernel_choose(kernel, mesh, chosen);
-    SILT_TRY(kernel_measure(kernel, mesh, x, width, err));
+    SILT_TRY(kernel_measure(kernel, mesh, x, width, layers, err));
+    if (layers) {
+        kernel_places(kernel, mesh->n_node);
+        kernel_layers(kernel, x, width);
+        return SILT_OK;
+    }
     if (kernel->dim == 3) {
         kernel_places(kernel, mesh->n_node);
         silt_sweep_build(&kernel->sweep, mesh, kernel->n_node, kernel->node, kernel->place, kernel->n_near, kernel->near, kernel->volume,
                          width * width / 4.0, kernel->edge);
-        return SILT_OK;
-    }
-    if (layers) {
-        kernel_places(kernel, mesh->n_node);
-        kernel_layers(kernel, x, width);
         return SILT_OK;
     }
     // a node without a cell keeps what is asked of it
@@ -140,10 +142,10 @@ silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const 
 }
 
 void silt_kernel_solve(const silt_kernel *kernel, int n_field, double *field) {
-    if (kernel->dim == 3)
-        silt_sweep_solve(&kernel->sweep, n_field, field);
-    else if (kernel->n_layer > 0)
+    if (kernel->n_layer > 0)
         kernel_layers_solve(kernel, n_field, field);
+    else if (kernel->dim == 3)
+        silt_sweep_solve(&kernel->sweep, n_field, field);
     else
         silt_nested_solve(kernel->nested, n_field, field);
 }

@@ -2,8 +2,8 @@
  * The kernel that spreads grains over the water and samples the water at grains: diffusion over the time b^2/4 with the lumped P1
  * mass M and the stiffness K of the water's cells, natural boundary. In the plane one implicit step, H = M + (b^2/4) K; in
  * space, where a factor of that is dear, H^-1 is a polynomial of M^-1 K times M^-1 with the same width (sweep.h).
- * With `layers`, for water that is the same along x in the mean, H^-1 = F (F^T M F)^-1 F^T, F the hat functions of the height with the
- * width b between their tops and (F^T M F) lumped: means along the whole of x, fine across. A kernel of grains' size around each grain would
+ * With `layers`, for water that is the same along x (space: and y) in the mean, H^-1 = F (F^T M F)^-1 F^T, F the hat functions of the height with the
+ * width b between their tops and (F^T M F) lumped: means along the whole of x (and y), fine across. A kernel of grains' size around each grain would
  * see it in its own shade.
  * H is symmetric and H 1 = M 1: what is spread is conserved, and sampling is the transpose of spreading.
  */

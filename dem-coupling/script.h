@@ -23,8 +23,8 @@ void script_delete(void *lmp);
 void script_add(void *lmp, const dem_shared *shared, const char *file, int fd);
 /** neighbours, contact forces and applied forces anew; nothing moves, nothing is added to the contacts' history */
 void script_set_up(void *lmp, const dem_shared *shared);
-/** velocities and spins of the walls that move, times share (0 for a set-up, in which all is at rest), for the runs to come */
-void script_motion(void *lmp, const dem_shared *shared, double share);
+/** velocity and spin of every motion of the walls, for the substeps to come */
+void script_motion(void *lmp, const dem_shared *shared, const double (*rate)[4]);
 /** n_step substeps, the first with the forces of the last set-up; every run has its own set-up before: impulses are
  * exact, and a restarted worker gives the same bits */
 void script_run(void *lmp, int n_step);

@@ -9,7 +9,7 @@
 #include "dem.h"
 #include "exchange.h"
 #include "frozen.h"
-#include "shape.h"
+#include "form.h"
 
 /** a discrete element as the coupling knows it; masses and forces per metre of width */
 typedef struct coupling_grain {
@@ -21,6 +21,7 @@ typedef struct coupling_grain {
     double torque[3];           // N m/m, the water's, where it is asked for
     double contact[3], net;     // N/m, of the last step
     double old_x[3], old_v[3];  // before the substeps
+    double gust[3];             // m/s, what eddies add to the water's velocity at it in the next step
     int contacts;
     int near; // a node of the water next to it when it was last located, -1: none
     uint8_t on_bed;
@@ -40,9 +41,12 @@ typedef struct coupling_view {
 } coupling_view;
 
 typedef struct coupling_body {
-    silt_outline shape;
+    silt_outline shape;  // in the plane
+    silt_solid form;     // in space: as fine as the shape asks for
+    silt_solid skin;     // with triangles of the water's size
     silt_clump clump;
     bool fixed;
+    bool freed; // its release has come
     double old_v[3];
 } coupling_body;
 
@@ -61,6 +65,9 @@ struct silt_coupling {
     double (*towards)[4];    // owned, where it has it after the substeps
     double (*pivot)[3];      // owned, centre without the angle
     double (*rate)[4];       // owned, m/s and rad/s
+    bool accelerates;        // one of them does so within a step: its rate is told substep by substep
+    unsigned char *guide;    // owned, what the worker is told besides forces (guide.h)
+    int guide_capacity;
     double width;            // m, accounting width: spheres stand for what is in this width of the slab; 1 in space
     double step;             // s, of the discrete elements
     double parcel;           // m, usual radius of a parcel, 0 without bed
@@ -116,6 +123,12 @@ void silt_coupling_hold(silt_coupling *coupling, coupling_grain *grain);
  * the water with its eddies. The random numbers hang on fluid.seed, the step and the grain's id. */
 void silt_coupling_walk(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, const double *viscosity, double dt,
                         int64_t step);
+// gust.c
+/** Gusts at the grains for the step that begins at `time`, after load: 0 where the water has no eddies. Their numbers hang on
+ * fluid.seed, the grain's id and how many gusts it has had. */
+void silt_coupling_gusts(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, const double *viscosity, double time);
+/** Velocities along the stream, across it and up over the local friction velocity. */
+void silt_gust_numbers(uint64_t random, double out[3]);
 /** Tells LIGGGHTS of it. */
 void silt_coupling_shift(silt_coupling *coupling);
 
@@ -125,11 +138,35 @@ void silt_coupling_twist(silt_coupling *coupling);
 bool silt_coupling_leaves(const silt_coupling *coupling, const double *a, const double *b, double near);
 /** a grain that LIGGGHTS no longer has: true when it went over an outlet; it is lost otherwise */
 bool silt_coupling_left_domain(const silt_coupling *coupling, const coupling_grain *grain);
+// bodies.c
+/** Surfaces, clumps, masses and places of the scene's bodies. Errors (SILT_INPUT): a shape that cannot be, that is too thin for the
+ * water's mesh, that lies behind a wall or in another body. */
+silt_status silt_coupling_bodies(silt_coupling *coupling, silt_error *err);
+void silt_coupling_bodies_clear(silt_coupling *coupling);
+/** tells the discrete elements of them */
+silt_status silt_coupling_send_bodies(silt_coupling *coupling, silt_error *err);
+/** distance from a point to body i; beyond `far` only a lower bound of it */
+double silt_coupling_body_distance(const silt_coupling *coupling, int i, const double *x, double far);
 // walls.c
 void silt_coupling_walls(silt_coupling *coupling);       /**< which of them move, and where all are */
 void silt_coupling_walls_stand(silt_coupling *coupling); /**< where the walls are now is where LIGGGHTS has them */
+/** grains.across: LIGGGHTS' box ends where the walls end in y; and where there a grain is that has gone over an end of it */
+void silt_coupling_sides(silt_coupling *coupling);
+double silt_coupling_across(const silt_coupling *coupling, double y);
 /** from where LIGGGHTS has the walls that move to where they are at the end of the step, in n substeps */
 void silt_coupling_walls_go(silt_coupling *coupling, int n);
+
+/** the rates of motion m in each of n substeps, which end where it stands at the end of the step: m/s and rad/s */
+void silt_coupling_wall_rates(silt_coupling *coupling, int m, int n, double (*rate)[4]);
+// guide.c
+/** Tells the worker what guides bodies and walls in the next n substeps; nothing where nothing does. After silt_coupling_walls_go. */
+void silt_coupling_guide(silt_coupling *coupling, int n);
+/** after the run: who was set free */
+void silt_coupling_guided(silt_coupling *coupling);
+/** to and from a checkpoint: who was */
+silt_status silt_coupling_freed(silt_coupling *coupling, bool out, silt_store *store, silt_error *err);
+/** where the path of a prescribed body has it at a time: x, y, z in m, angle in radians */
+void silt_coupling_place(const silt_coupling *coupling, int body, double time, double place[4]);
 
 /** Grains, frozen spheres, bodies and counters to and from the store, under "coupling/"; all that is saved was sent.
  * Errors (SILT_FAILED): an array that is absent or has another length, naming it. */

@@ -68,6 +68,7 @@ typedef struct silt_walls {
     int *next, *previous;        // owned, 2-D: segment joined at `to` / at `from`, -1
     int (*joined)[3];            // owned, 3-D: element across the edge that starts at each corner, -1
     int n_wall;
+    double time;                 // s, at which those that move stand where they are
     silt_wall_motion *motion;    // owned, one per wall of the scene
     int n_degenerate;            // triangles of surface files without area, left out
     struct silt_wall_index *index; // owned, elements by place, what moves (wall.h)
@@ -394,6 +395,7 @@ typedef struct silt_body_state {
                                        // counter-clockwise
         int n_face;
         const int (*face)[3];          // 3-D: triangles of points, counter-clockwise from outside, borrowed
+        const struct silt_solid *solid; // 3-D: the same surface to search in (solid.h), borrowed
     } *body; // owned by the coupling
 } silt_body_state;
 

@@ -1,5 +1,5 @@
 #!/bin/sh
-# A scene of water alone stays in one process without LIGGGHTS, MPI and VTK: looks at a run while it runs.
+# A scene of water alone stays in one process without LIGGGHTS, MPI and VTK, and what draws is not loaded: looks at a run while it runs.
 # usage: processes.sh SILT SCENE [option of silt run]...
 # e.g.:  processes.sh build/silt cases/dam-break/scene.yaml -D fluid.size=0.0146 -D time.end=100
 # The scene must run for some seconds; it is stopped as soon as enough was seen.
@@ -72,7 +72,7 @@ while [ "$look" -lt 20 ]; do
     *) fail "process $pid maps no CHOLMOD: this is not the solver" ;;
     esac
     foreign=$(printf '%s\n' "$maps" | awk 'NF >= 6 { print $6 }' | sort -u |
-        grep -iE 'liggghts|libmpi|libopen-(rte|pal)|libpmix|openmpi|mpich|libvtk' || true)
+        grep -iE 'liggghts|libmpi|libopen-(rte|pal)|libpmix|openmpi|mpich|libvtk|libcairo|libpixman|libfontconfig|libX11|gmsh|silt-draw' || true)
     [ -z "$foreign" ] || fail "the solver has mapped: $foreign"
     if [ -n "$helpers" ]; then
         for helper in $helpers; do
@@ -90,4 +90,4 @@ while alive && [ "$waited" -lt 200 ]; do
     waited=$((waited + 1))
     sleep 0.05
 done
-echo "processes: 20 looks: one process, no LIGGGHTS, MPI or VTK mapped"
+echo "processes: 20 looks: one process, no LIGGGHTS, MPI, VTK, cairo or gmsh mapped"

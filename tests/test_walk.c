@@ -1,7 +1,9 @@
 // the random walk of suspended grains, through the worker: variance 2 K t, well mixed stays well mixed in a parabolic diffusivity,
-// the same numbers for the same seed, step and grain; grains that touch stay
+// the same numbers for the same seed, step and grain; grains that touch stay; gusts as large, joined and long as told
 #include "coupling.h"
 #include "run.h"
+
+#include "../dem-coupling/state.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -206,12 +208,74 @@ static void test_keyed(void **unused) {
     assert_true(first[0][0] != first[2][0]);
 }
 
+// gusts in a shear S with the eddy viscosity K: u*^2 = K S, deviations and correlation as published, each lasts its time
+static void test_gusts(void **unused) {
+    (void)unused;
+    basin b;
+    basin_open(&b, "[[0.01, 0.01], [0.09, 0.09]]", 2000, 4);
+    b.scene->grains.gusts = 0.1;
+    b.scene->gravity[1] = -9.81;
+    const double rate = 3, eddy = 2e-5, friction = sqrt(eddy * rate);
+    for (int e = 0; e < b.mesh.n_cell; e++)
+        b.viscosity[e] = 1e-3 + 1000 * eddy;
+    for (int i = 0; i < b.nodes.count; i++)
+        b.nodes.v[2 * i] = 1 + rate * b.nodes.x[2 * i + 1];
+    const silt_drag *drag;
+    OK(dem->prepare(b.coupling, &b.nodes, &b.mesh, 1e-9, &drag, &error));
+    dem->load(b.coupling, &b.nodes, &b.mesh, 1e-9);
+    enum { TURNS = 20 };
+    const int n = b.coupling->n_grain;
+    double along = 0, up = 0, stress = 0, before = 0;
+    int changed = 0;
+    for (int k = 0; k < TURNS; k++) {
+        dem->gusts(b.coupling, &b.nodes, &b.mesh, b.viscosity, 0.1 * k);
+        for (int i = 0; i < n; i++) {
+            const double *c = b.coupling->grain[i].gust;
+            along += c[0] * c[0] / (n * TURNS * friction * friction);
+            up += c[1] * c[1] / (n * TURNS * friction * friction);
+            stress += c[0] * c[1] / (n * TURNS * friction * friction);
+        }
+        // a fifth of the time later a fifth of them are others
+        double *old = silt_alloc((size_t)n, sizeof *old);
+        for (int i = 0; i < n; i++)
+            old[i] = b.coupling->grain[i].gust[0];
+        dem->gusts(b.coupling, &b.nodes, &b.mesh, b.viscosity, 0.1 * k + 0.02);
+        for (int i = 0; i < n; i++)
+            changed += b.coupling->grain[i].gust[0] != old[i];
+        before = old[0];
+        free(old);
+    }
+    print_message("along %.3f, up %.3f, stress %.3f, new %.3f\n", sqrt(along), sqrt(up), stress, (double)changed / (n * TURNS));
+    // of 40000: three standard errors
+    near(along / (2.30 * 2.30), 1, 0.022, "square along the stream");
+    near(up / (1.27 * 1.27), 1, 0.022, "square upwards");
+    near(stress, -1, 3 * sqrt(2.30 * 2.30 * 1.27 * 1.27 + 1) / 200, "stress");
+    near((double)changed / (n * TURNS), 0.2, 0.006, "new gusts");
+    assert_true(before != 0);
+    // across the stream, in space
+    double across = 0;
+    for (uint64_t k = 0; k < 40000; k++) {
+        double share[3];
+        silt_gust_numbers(silt_hash(1, &k, sizeof k), share);
+        across += share[1] * share[1] / 40000;
+    }
+    near(across / (1.63 * 1.63), 1, 0.022, "square across");
+    // no stress, no gusts
+    for (int e = 0; e < b.mesh.n_cell; e++)
+        b.viscosity[e] = 1e-3;
+    dem->gusts(b.coupling, &b.nodes, &b.mesh, b.viscosity, 5);
+    for (int i = 0; i < n; i++)
+        near(silt_length(3, b.coupling->grain[i].gust), 0, 0, "gust without eddies");
+    basin_close(&b);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_variance),
         cmocka_unit_test(test_well_mixed),
         cmocka_unit_test(test_around),
         cmocka_unit_test(test_keyed),
+        cmocka_unit_test(test_gusts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

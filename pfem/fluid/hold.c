@@ -129,6 +129,16 @@ static void hold_bed_ends(silt_fluid *f, const silt_step *s) {
             }
 }
 
+// Where free facets begin, at a shore, at a brink, around a hollow, a node that stays cannot go where the surface goes: water that slid
+// out through it would be gone, since nothing moves there.
+static void hold_bed_rims(silt_fluid *f, const silt_step *s) {
+    const silt_mesh *mesh = s->mesh;
+    for (int k = 0; k < mesh->n_facet; k++)
+        for (int c = 0; c < f->dim && mesh->facet_kind[k] != FACET_BED && mesh->facet_kind[k] != FACET_WALL; c++)
+            if (s->nodes->kind[mesh->facet[k][c]] == NODE_BED)
+                f->hold[mesh->facet[k][c]] = HOLD_ALL;
+}
+
 // slip on the bed: the normal of its facets around the node
 static void hold_bed(silt_fluid *f, const silt_step *s) {
     const silt_mesh *mesh = s->mesh;
@@ -146,6 +156,7 @@ static void hold_bed(silt_fluid *f, const silt_step *s) {
         }
     }
     hold_bed_ends(f, s);
+    hold_bed_rims(f, s);
     SILT_RESERVE(f->still, f->still_capacity, f->n_node + 1);
     for (int i = 0; i < f->n_node; i++)
         if (s->nodes->kind[i] == NODE_BED && f->hold[i] == HOLD_NORMAL) {

@@ -1,17 +1,17 @@
-// keeps the water's mesh on the bed: edges (in space faces) of the bed that the triangulation has lost
+// keeps the water's mesh on the bed and, in space, on bodies: edges (in space faces) of theirs that the triangulation has lost
 
 #include "remesh.h"
 
-// A node close over a face of the bed is joined by the triangulation to nodes on the bed's other side, right through it. Such cells are
+// A node close over a face of the bed or a body is joined by the triangulation to nodes on its other side, right through it. Such cells are
 // no water, and a hollow without pressure would stay on the face. It is filled by cells between faces and node.
 #define FIT_FLAT 0.002 // times h: flatter cells are left out
 
-/** a free facet with two nodes on the bed, from -> to as it lists them, and its third node */
+/** a free facet with two nodes on the bed or on one body, from -> to as it lists them, and its third node */
 typedef struct fit_rim {
     int from, to, apex;
 } fit_rim;
 
-/** a side of a face of the bed that is no facet of the water */
+/** a side of a face of the bed or a body that is no facet of the water */
 typedef struct fit_side {
     int from, to, face;
 } fit_side;
@@ -22,7 +22,7 @@ typedef struct fit {
     int n_rim, rim_capacity, n_side, side_capacity, n_face, face_capacity;
     fit_rim *rim;   // owned, sorted
     fit_side *side; // owned, sorted
-    int (*face)[4]; // owned, the bed's faces that are missing, in the water's numbers, counter-clockwise seen from it; fourth -1
+    int (*face)[4]; // owned, the faces that are missing, in the water's numbers, counter-clockwise seen from it; fourth -1
     int *stack, *state; // owned, one per face: of the fill at work (state 1), filled (2)
 } fit;
 
@@ -48,43 +48,86 @@ static int first_from(int n, const void *record, int from, int to) {
     return lo;
 }
 
-// free facets at the bed, and which of the bed's faces are facets of the water
-static void fit_collect(fit *f, const silt_bed *bed) {
+// which solid a node is of: a body, -1 the bed, -2 none
+static int fit_owner(const silt_nodes *nodes, int i) {
+    return nodes->kind[i] == NODE_BODY ? nodes->owner[i] : nodes->kind[i] == NODE_BED ? -1 : -2;
+}
+
+// a face that no facet of the water is
+static void fit_missing(fit *f, const silt_cell_set *set, const int face[4]) {
+    if (face[0] < 0 || face[1] < 0 || face[2] < 0 || silt_cell_set_find(set, face) >= 0)
+        return;
+    SILT_RESERVE(f->face, f->face_capacity, f->n_face + 1);
+    memcpy(f->face[f->n_face], face, sizeof *f->face);
+    SILT_RESERVE(f->side, f->side_capacity, f->n_side + 3);
+    for (int a = 0; a < 3; a++)
+        f->side[f->n_side++] = (fit_side){face[a], face[(a + 1) % 3], f->n_face};
+    f->n_face++;
+}
+
+// The water's node of every point of the bodies' surfaces, one body after the other: they were the first nodes, in this order, and
+// keep their ids. @return owned by the caller
+static int *fit_body_nodes(const silt_nodes *nodes, const silt_body_state *bodies) {
+    int n = 0;
+    for (int b = 0; b < bodies->count; b++)
+        n += bodies->body[b].n_point;
+    int *node = silt_alloc((size_t)n + 1, sizeof *node);
+    for (int k = 0; k < n; k++)
+        node[k] = -1;
+    for (int i = 0; i < nodes->count; i++)
+        if (nodes->kind[i] == NODE_BODY && nodes->id[i] < n)
+            node[nodes->id[i]] = i;
+    return node;
+}
+
+static void fit_bodies(fit *f, const silt_cell_set *set, const silt_body_state *bodies) {
+    int *node = fit_body_nodes(f->nodes, bodies), first = 0;
+    for (int b = 0; b < bodies->count; b++) {
+        const struct silt_body *body = &bodies->body[b];
+        for (int k = 0; k < body->n_face; k++) {
+            const int *point = body->face[k], face[4] = {node[first + point[0]], node[first + point[1]], node[first + point[2]], -1};
+            fit_missing(f, set, face);
+        }
+        first += body->n_point;
+    }
+    free(node);
+}
+
+// free facets at the bed and bodies, and which of their faces are facets of the water
+static void fit_collect(fit *f, const silt_barrier *barrier) {
     const silt_mesh *mesh = f->draft->mesh;
     int(*facet)[4] = NULL, n = 0, capacity = 0;
     for (int e = 0; e < mesh->n_cell; e++)
         for (int a = 0; a < 4; a++) {
             if (mesh->across[e][a] >= 0)
                 continue;
-            int own[4] = {-1, -1, -1, -1}, n_bed = 0, other = 0;
+            int own[4] = {-1, -1, -1, -1}, of[3], other = -1;
             silt_cell_facet(3, mesh->cell[e], a, own);
-            for (int k = 0; k < 3; k++) {
-                n_bed += f->nodes->kind[own[k]] == NODE_BED;
-                other = f->nodes->kind[own[k]] == NODE_BED ? other : k;
-            }
-            if (n_bed == 3) {
+            for (int k = 0; k < 3; k++)
+                of[k] = fit_owner(f->nodes, own[k]);
+            // the one that is not of the others' solid
+            for (int k = 0; k < 3; k++)
+                if (of[(k + 1) % 3] == of[(k + 2) % 3] && of[(k + 1) % 3] != -2 && of[k] != of[(k + 1) % 3])
+                    other = k;
+            if (of[0] == of[1] && of[1] == of[2] && of[0] != -2) {
                 SILT_RESERVE(facet, capacity, n + 1);
                 memcpy(facet[n++], own, sizeof own);
-            } else if (n_bed == 2 && silt_facet_kind_of(mesh, f->nodes, own) == FACET_FREE) {
+            } else if (other >= 0 && silt_facet_kind_of(mesh, f->nodes, own) == FACET_FREE) {
                 SILT_RESERVE(f->rim, f->rim_capacity, f->n_rim + 1);
                 f->rim[f->n_rim++] = (fit_rim){own[(other + 1) % 3], own[(other + 2) % 3], own[other]};
             }
         }
     silt_cell_set set;
     silt_cell_set_create(&set, f->nodes->count, n, (const int(*)[4])facet);
-    for (int k = 0; k < bed->n_edge && f->n_rim; k++) {
+    const silt_bed *bed = barrier->bed;
+    for (int k = 0; bed && k < bed->n_edge && f->n_rim; k++) {
         int face[4] = {-1, -1, -1, -1};
         for (int a = 0; a < 3; a++)
             face[a] = bed->fluid_node[bed->edge[k][a]];
-        if (face[0] < 0 || face[1] < 0 || face[2] < 0 || silt_cell_set_find(&set, face) >= 0)
-            continue;
-        SILT_RESERVE(f->face, f->face_capacity, f->n_face + 1);
-        memcpy(f->face[f->n_face], face, sizeof face);
-        SILT_RESERVE(f->side, f->side_capacity, f->n_side + 3);
-        for (int a = 0; a < 3; a++)
-            f->side[f->n_side++] = (fit_side){face[a], face[(a + 1) % 3], f->n_face};
-        f->n_face++;
+        fit_missing(f, &set, face);
     }
+    if (barrier->bodies && f->n_rim)
+        fit_bodies(f, &set, barrier->bodies);
     silt_cell_set_clear(&set);
     free(facet);
     if (f->n_face) {
@@ -194,15 +237,19 @@ static void fit_edges(silt_draft *draft, const silt_nodes *nodes, const silt_bed
     free(side);
 }
 
-int silt_mesh_fit_bed(silt_draft *draft, const silt_nodes *nodes, const silt_bed *bed, double size) {
+int silt_mesh_fit(silt_draft *draft, const silt_nodes *nodes, const silt_barrier *barrier, double size) {
+    const bool bed = barrier->bed && barrier->bed->n_cell;
     if (draft->mesh->dim != 3) {
         const int first = draft->mesh->n_cell;
-        fit_edges(draft, nodes, bed, size);
+        if (bed)
+            fit_edges(draft, nodes, barrier->bed, size);
         return draft->mesh->n_cell - first;
     }
+    if (!bed && !(barrier->bodies && barrier->bodies->count))
+        return 0;
     fit f = {.draft = draft, .nodes = nodes};
     const int before = draft->mesh->n_cell;
-    fit_collect(&f, bed);
+    fit_collect(&f, barrier);
     f.stack = silt_alloc((size_t)f.n_face + 1, sizeof *f.stack);
     f.state = silt_alloc((size_t)f.n_face + 1, sizeof *f.state);
     for (int k = 0; k < f.n_face; k++)

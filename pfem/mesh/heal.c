@@ -125,7 +125,8 @@ static void try_edge(const healer *s, int e, const int corner[4], remedy *best) 
         for (int k = i + 1; k < n; k++)
             for (int j = k + 1; j < n; j++)
                 f.upper[i][k][j] = f.lower[i][k][j] = -2;
-    const double bar = before + silt_max(best->gain - HEAL_TIE, HEAL_TIE);
+    // a division with a cell that is turned over heals nothing
+    const double bar = silt_max(before + silt_max(best->gain - HEAL_TIE, HEAL_TIE), 0);
     double worst[HEAL_RING][HEAL_RING], cost[HEAL_RING][HEAL_RING];
     int split[HEAL_RING][HEAL_RING];
     for (int span = 1; span < n; span++)

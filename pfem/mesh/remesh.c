@@ -3,7 +3,9 @@
 #include "delaunay.h"
 #include "parallel.h"
 #include "remesh.h"
+#include "solid.h"
 
+static const double cloud_parts = 17592186044416.0; // 2^44, of a period
 #define WEDGE_LONG 3.5 // times h: longest edge of a cell in a wedge on a wall
 
 static bool polygon_contains(int n, const double *p, double x, double y) {
@@ -23,6 +25,15 @@ bool silt_barrier_contains(const silt_barrier *barrier, const double *point) {
         return true;
     for (int b = 0; barrier->bodies && b < barrier->bodies->count; b++) {
         const struct silt_body *body = &barrier->bodies->body[b];
+        if (body->solid) {
+            double local[3] = {point[0] - body->x[0], point[1] - body->x[1], point[2] - body->x[2]};
+            if (silt_dot(3, local, local) > silt_square(body->solid->radius))
+                continue;
+            silt_turn(body->q, true, local, local);
+            if (silt_solid_contains(body->solid, local))
+                return true;
+            continue;
+        }
         // into the body's frame: turned back about z
         const double c = 1 - 2 * body->q[3] * body->q[3], s = 2 * body->q[0] * body->q[3];
         const double dx = point[0] - body->x[0], dy = point[1] - body->x[1];
@@ -92,6 +103,11 @@ bool silt_cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int
     if (shape->height >= CELL_FLAT * h)
         return false;
     if (silt_mesh_share(mesh, nodes, mesh->dim + 1, cell))
+        return true;
+    int n_body = 0; // in space also all on one body
+    for (int a = 0; a < 4 && mesh->dim == 3; a++)
+        n_body += nodes->kind[cell[a]] == NODE_BODY && nodes->owner[cell[a]] == nodes->owner[cell[0]];
+    if (n_body == 4)
         return true;
     // in space also between nodes of an opening or of the bed, and of the wall around it
     bool opening = false, free_facet = false;
@@ -318,13 +334,29 @@ static bool cell_is_dent(const silt_mesh *mesh, const int *cell, const double *c
     return false;
 }
 
+// Across a dented surface the cloud's hull has flat cells of any length. Where x is periodic such cells are not the same at both ends, and one
+// of half the period has no nearest copy: none is water.
+static bool cell_straddles(const silt_mesh *mesh, const double *corner, double bound) {
+    return mesh->dim == 3 && mesh->period[0] > 0 && !(enclosing_radius(corner) < 1.5 * bound);
+}
+
+// in whole parts of the period, see cloud_points
+static bool cell_too_long(int n_corner, const int *cell, const double *x, double period) {
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (int a = 0; a < n_corner; a++) {
+        low = silt_min(low, x[(n_corner - 1) * cell[a]]);
+        high = silt_max(high, x[(n_corner - 1) * cell[a]]);
+    }
+    return high - low >= 0.5 * period;
+}
+
 // The live nodes; where x is periodic, nodes nearer to its ends than `margin` are put beyond the other end too. Coordinates are
 // whole parts of the period then: both copies of a cell have the same numbers but for a whole shift, so that ties are broken alike.
 // @param live  out, owned by the caller, the points' nodes, *n_live that are no copies first  @return how many points
 static int cloud_points(const silt_mesh *mesh, const silt_nodes *nodes, const silt_scene *scene, const uint8_t *dead,
                         double margin, int **live, double **x, int *n_live) {
     const int n = nodes->count, dim = mesh->dim;
-    const double period = mesh->period[0], parts = 17592186044416.0, scale = period > 0 ? parts / period : 1; // 2^44
+    const double period = mesh->period[0], parts = cloud_parts, scale = period > 0 ? parts / period : 1;
     int m = 0, room = 0, x_room = 0;
     SILT_RESERVE(*live, room, n + 1);
     SILT_RESERVE(*x, x_room, dim * n + 1);
@@ -376,7 +408,7 @@ static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, c
             for (int a = 1; a < n_corner; a++)
                 if (live[cell[a]] < live[cell[lowest]])
                     lowest = a;
-            if (cell[lowest] >= n_live)
+            if (cell[lowest] >= n_live || (mesh->period[0] > 0 && cell_too_long(n_corner, cell, x, cloud_parts)))
                 continue;
             for (int a = 0; a < n_corner; a++)
                 found[n_corner * kept + a] = live[cell[a]];
@@ -489,12 +521,12 @@ static void peel_slivers(silt_draft *draft, const silt_nodes *nodes, const uint8
 }
 
 // the chosen cells' neighbours; in 3-D slivers are taken off the surface and mended inside. @return flat cells left
-static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, uint8_t **sliver, const silt_bed *bed, double size) {
+static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, uint8_t **sliver, const silt_barrier *barrier, double size) {
     silt_mesh *mesh = draft->mesh;
     SILT_RESERVE(mesh->across, mesh->across_capacity, mesh->n_cell + 1);
     silt_cells_across(mesh->dim, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
     int flat;
-    const int before = mesh->n_cell, more = bed && bed->n_cell ? silt_mesh_fit_bed(draft, nodes, bed, size) : 0;
+    const int before = mesh->n_cell, more = silt_mesh_fit(draft, nodes, barrier, size);
     if (more) {
         int capacity = before;
         SILT_RESERVE(*sliver, capacity, mesh->n_cell);
@@ -537,14 +569,15 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
         bool in = false;
         for (int r = 0; r < scene->fluid.n_region && !in; r++)
             in = silt_region_contains(&scene->fluid.region[r], centre);
-        if (!flat && !(in && shape.radius < 2 * scene->fluid.alpha * h))
+        if ((!flat && !(in && shape.radius < 2 * scene->fluid.alpha * h)) ||
+            (flat && cell_straddles(mesh, corner, scene->fluid.alpha * h)))
             continue;
         SILT_RESERVE(sliver, sliver_capacity, mesh->n_cell + 1);
         sliver[mesh->n_cell] = flat;
         silt_draft_push(&draft, cell, -1, shape.height / h);
     }
     free(cells);
-    draft_finish(&draft, nodes, NULL, &sliver, barrier->bed, scene->fluid.size);
+    draft_finish(&draft, nodes, NULL, &sliver, barrier, scene->fluid.size);
     free(sliver);
     draft_clear(&draft);
     silt_mesh_connect_known(mesh, nodes);
@@ -596,6 +629,8 @@ static choice cell_choose(const chooser *c, const int *cell, int before, double 
         return CELL_NO;
     const double bound = scene->fluid.alpha * h;
     const bool round = shape.radius < bound;
+    if (flat && cell_straddles(mesh, corner, bound))
+        return CELL_NO;
     const bool wedge = !round && wedge_cell(mesh, nodes, cell, corner, h) && !(before < 0 && cell_is_dent(mesh, cell, corner));
     if (!(inner || flat || wedge || round || (dim == 3 && enclosing_radius(corner) < bound)))
         return CELL_NO;
@@ -737,7 +772,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
         if (period <= 0 || 2 * largest <= margin || margin >= period)
             break;
     }
-    memory->flat = draft_finish(&draft, nodes, nodes->x, &sliver, barrier->bed, scene->fluid.size);
+    memory->flat = draft_finish(&draft, nodes, nodes->x, &sliver, barrier, scene->fluid.size);
 
     uint8_t *was_wet = silt_alloc((size_t)nodes->count + 1, 1);
     for (int e = 0; e < memory->n_cell; e++)

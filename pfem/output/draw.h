@@ -48,6 +48,7 @@ typedef struct silt_draw_canvas {
     int slice;           // 3-D: 1 to 3: a cut across x, y or z, drawn in the plane; 0: none
     double slice_at;     // m
     double low, high;    // colour range
+    bool plain;          // nothing is coloured by value: no colour bar
     double density;      // kg/m3, largest density of the bed
     double scale;        // pixels per metre
     int width, height;   // of the plot, pixels

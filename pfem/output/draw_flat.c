@@ -20,7 +20,7 @@ static void draw_extend(double lo[2], double hi[2], double x, double y) {
 // pixels per metre, aspect 1:1; a flat scene gets air above, a high and narrow one gets room at the sides
 static void draw_layout(silt_draw_canvas *c) {
     double wide = c->hi[0] - c->lo[0], high = c->hi[1] - c->lo[1];
-    c->right = c->field->label ? MARGIN_BAR : MARGIN_RIGHT;
+    c->right = c->plain ? MARGIN_RIGHT : MARGIN_BAR;
     c->scale = silt_min((PICTURE_WIDTH - MARGIN_LEFT - c->right) / wide, PLOT_HEIGHT / high);
     if (high * c->scale < PLOT_LOW)
         c->hi[1] = c->lo[1] + PLOT_LOW / c->scale;

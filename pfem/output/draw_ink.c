@@ -116,6 +116,7 @@ void silt_draw_range_round(silt_draw_canvas *c) {
         c->high = silt_max(fabs(c->low), fabs(c->high));
         c->low = -c->high;
     }
+    c->plain = !c->field->label || !(c->low < HUGE_VAL);
     if (!(c->low < HUGE_VAL))
         c->low = 0, c->high = 1;
     if (c->low > 0 && c->low < 0.5 * c->high)
@@ -158,7 +159,7 @@ void silt_draw_number(char text[32], double value, double step) {
 }
 
 void silt_draw_bar(silt_draw_canvas *c) {
-    if (!c->field->label)
+    if (c->plain)
         return;
     cairo_t *cr = c->cr;
     double x = MARGIN_LEFT + c->width + 26, width = 18, high = silt_min(c->height, 420);

@@ -498,7 +498,7 @@ void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, 
     space s = {.c = c};
     space_frame(&s);
     const double wide = s.hi[0] - s.lo[0], high = s.hi[1] - s.lo[1];
-    c->right = c->field->label ? MARGIN_BAR : MARGIN_RIGHT;
+    c->right = c->plain ? MARGIN_RIGHT : MARGIN_BAR;
     c->scale = silt_min((PICTURE_WIDTH - MARGIN_LEFT - c->right) / wide, PLOT_HEIGHT / high);
     c->width = (int)silt_max(PLOT_NARROW, lround(wide * c->scale));
     c->height = (int)silt_max(PLOT_LOW, lround(high * c->scale));

@@ -175,6 +175,14 @@ typedef struct silt_report_def {
 /** One HTML page on a run that needs no network: what ran, pictures, a view to turn, checks, ledgers, times. It may be made while the
  * run goes. say: what it lacks and where it is, NULL: nothing */
 silt_status silt_report(const char *out, const silt_report_def *def, FILE *say, silt_error *err);
+
+// pictures.c ------------------------------------------------------------------------------------------
+/** silt_draw and silt_report: a module has them, so that nothing else loads cairo */
+typedef struct silt_pictures {
+    silt_status (*draw)(const char *out, const silt_draw_def *def, FILE *say, silt_error *err);
+    silt_status (*report)(const char *out, const silt_report_def *def, FILE *say, silt_error *err);
+} silt_pictures;
+silt_status silt_pictures_load(const silt_pictures **pictures, silt_error *err);
 silt_status silt_info(const char *path, FILE *to, silt_error *err);
 /** the part of it about a scene */
 void silt_info_scene(const silt_scene *scene, FILE *to);

@@ -339,7 +339,7 @@ static void view_head(FILE *to, const view *v) {
     for (int k = 0; k < c->field->n_map; k++)
         fprintf(to, "%s\"#%06x\"", k ? "," : "", c->field->map[k]);
     fprintf(to, "],\"low\":%.9g,\"high\":%.9g,\"label\":", c->low, c->high);
-    silt_json_text(to, c->field->label);
+    silt_json_text(to, c->plain ? NULL : c->field->label);
     fputs(",\n\"frames\":[", to);
 }
 

@@ -152,6 +152,7 @@ static silt_status measure_steps(silt_run *run, bench_row *row, silt_error *err)
         row->phase[c] = median(n, &s->phase[c], SAMPLE_LENGTH) / row->nodes;
         row->step += row->phase[c];
     }
+    row->coupling = row->grains > 0 ? MEAN(n, s, phase[CLOCK_coupling]) / row->grains : 0;
     row->unit = median(n, &s->unit, SAMPLE_LENGTH) / row->nodes;
     for (int k = 0; k < n; k++) {
         ratio[k] = s[k].total / s[k].unit;

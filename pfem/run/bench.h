@@ -58,6 +58,7 @@ typedef struct bench_row {
     double start;                 // s, to the state at t = 0
     double bytes;                 // peak of the process, less what it had before the scene, per node
     double substeps;              // of the grains, per step
+    double coupling;              // s per grain and step: mean over the steps, without the grains' own
     double seconds, time, unit_2; // s: whole run, model time, U2
     double volume_early, volume;  // largest volume error until 0.3 s, and at all
 } bench_row;

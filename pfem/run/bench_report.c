@@ -83,6 +83,8 @@ void bench_table(FILE *to, const bench_row *row, int n) {
         LINE("substeps", "a step", "%10.1f", r->substeps);
         LINE("grains", "ns each", "%10.0f", 1e9 * r->phase[CLOCK_grains] * r->nodes / (r->grains * silt_max(r->substeps, 1)));
         LINE("coupling", "ns/grain", "%10.0f", 1e9 * r->phase[CLOCK_coupling] * r->nodes / r->grains);
+        if (!row->whole)
+            LINE("the mean of it", "ns/grain", "%10.0f", 1e9 * r->coupling);
     }
     if (row->whole) {
         LINE("steps", "", "%10.0f", (double)r->steps);

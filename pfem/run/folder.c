@@ -39,7 +39,8 @@ static void out_clear(const char *out) {
                                        "run.h5",
                                        "*.hdf.series",
                                        "*_[0-9][0-9][0-9][0-9][0-9][0-9].hdf",
-                                       "picture_*.png"};
+                                       "picture_*.png",
+                                       "report.html"};
     DIR *folder = opendir(out);
     for (struct dirent *entry; folder && (entry = readdir(folder));)
         for (size_t k = 0; k < sizeof ours / sizeof *ours; k++) {

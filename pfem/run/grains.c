@@ -8,20 +8,39 @@
 bool silt_run_set_up_due(const silt_run *run) { return run->tick == 0 || run->step % SET_UP_EVERY == 0; }
 
 // force and torque of the water on body b: the reaction of its nodes, turned round. @return false: it is dry
-static bool water_on_body(const silt_run *run, int b, double force[2], double *torque) {
+static bool water_on_body(const silt_run *run, int b, double force[3], double torque[3]) {
     const struct silt_body *body = &silt_coupling_dem.bodies(run->coupling)->body[b];
+    const int D = silt_nodes_dim(&run->nodes);
     bool wet = false;
-    force[0] = force[1] = *torque = 0;
+    memset(force, 0, 3 * sizeof *force);
+    memset(torque, 0, 3 * sizeof *torque);
     for (int i = 0; i < run->nodes.count; i++) {
         if (run->nodes.kind[i] != NODE_BODY || run->nodes.owner[i] != b || !run->mesh.wet[i])
             continue;
-        const double fx = -run->fluid.reaction[2 * i], fy = -run->fluid.reaction[2 * i + 1];
-        force[0] += fx;
-        force[1] += fy;
-        *torque += (run->nodes.x[2 * i] - body->x[0]) * fy - (run->nodes.x[2 * i + 1] - body->x[1]) * fx;
+        double own[3] = {0}, arm[3] = {0};
+        for (int d = 0; d < D; d++) {
+            own[d] = -run->fluid.reaction[D * i + d];
+            arm[d] = run->nodes.x[D * i + d] - body->x[d];
+            force[d] += own[d];
+        }
+        for (int d = D == 3 ? 0 : 2; d < 3; d++)
+            torque[d] += arm[(d + 1) % 3] * own[(d + 2) % 3] - arm[(d + 2) % 3] * own[(d + 1) % 3];
         wet = true;
     }
     return wet;
+}
+
+// m, the farthest point of a body from its centroid; kg m2, its smallest moment of inertia
+static double body_reach(const silt_run *run, const struct silt_body *body) {
+    const int D = silt_nodes_dim(&run->nodes);
+    double reach = 0;
+    for (int k = 0; k < body->n_point; k++)
+        reach = silt_max(reach, silt_length(D, body->point + D * k));
+    return reach;
+}
+
+static double body_inertia(const silt_run *run, const struct silt_body *body) {
+    return silt_nodes_dim(&run->nodes) == 3 ? silt_min(body->inertia[0], silt_min(body->inertia[1], body->inertia[2])) : body->inertia[2];
 }
 
 // a force that would carry a free body over a cell from rest, or turn it as far, is none: the water's step has failed. LIGGGHTS
@@ -31,15 +50,14 @@ silt_status silt_run_loads_sane(const silt_run *run, silt_error *err) {
     const silt_body_state *bodies = run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
     for (int b = 0; bodies && b < bodies->count; b++) {
         const struct silt_body *body = &bodies->body[b];
-        double force[2], torque, reach = 0;
-        if (scene->body[b].motion == MOTION_FIXED || !water_on_body(run, b, force, &torque))
+        double force[3], torque[3];
+        if (scene->body[b].motion != MOTION_FREE || !water_on_body(run, b, force, torque))
             continue;
-        for (int k = 0; k < body->n_point; k++)
-            reach = silt_max(reach, hypot(body->point[2 * k], body->point[2 * k + 1]));
-        const double way = silt_square(run->dt) * (silt_length(2, force) / body->mass + fabs(torque) * reach / body->inertia[2]);
+        const double way = silt_square(run->dt) * (silt_length(3, force) / body->mass + silt_length(3, torque) * body_reach(run, body) / body_inertia(run, body));
         if (!(way < scene->fluid.size))
-            return silt_fail(err, SILT_FAILED, "the water's force (%.3g, %.3g) N and torque %.3g N m would throw body '%s' at (%g, %g) over %.2g cells in a step",
-                             force[0], force[1], torque, scene->body[b].name, body->x[0], body->x[1], way / scene->fluid.size);
+            return silt_fail(err, SILT_FAILED, "the water's force (%.3g, %.3g, %.3g) N and torque %.3g N m would throw body '%s' at (%g, %g, %g) over %.2g cells in a step",
+                             force[0], force[1], force[2], silt_length(3, torque), scene->body[b].name, body->x[0], body->x[1], body->x[2],
+                             way / scene->fluid.size);
     }
     return SILT_OK;
 }
@@ -52,8 +70,8 @@ static void load_bodies(silt_run *run, double before, bool again) {
     silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
     SILT_RESERVE(run->body_load, run->body_load_capacity, bodies->count + 1);
     for (int b = 0; b < bodies->count; b++)
-        for (int d = 0; d < 3; d++) {
-            double *load = d < 2 ? &bodies->body[b].force[d] : &bodies->body[b].torque[2];
+        for (int d = 0; d < 6; d++) {
+            double *load = d < 3 ? &bodies->body[b].force[d] : &bodies->body[b].torque[d - 3];
             if (again)
                 *load = run->body_load[b][d];
             run->body_load[b][d] = *load;
@@ -61,18 +79,21 @@ static void load_bodies(silt_run *run, double before, bool again) {
     const double rho = run->scene->fluid.density, theta = run->scene->fluid.theta;
     const double ratio = (before > 0 ? silt_clamp(before / run->dt, 1, 20) : 1) / theta;
     const double most = silt_max(2 - 1 / theta, 0.1); // half of what the linear loop bears
+    const bool space = silt_nodes_dim(&run->nodes) == 3;
     for (int b = 0; b < bodies->count; b++) {
         struct silt_body *body = &bodies->body[b];
-        double force[2], torque, reach = 0;
-        const bool wet = water_on_body(run, b, force, &torque);
-        for (int k = 0; k < body->n_point; k++)
-            reach = silt_max(reach, hypot(body->point[2 * k], body->point[2 * k + 1]));
-        // added mass and inertia: those of the disc around it
-        const double added = rho * M_PI * silt_square(reach), turned = 0.25 * added * silt_square(reach);
-        const double share = most / (1 + ratio * added / body->mass), twist = most / (1 + ratio * turned / body->inertia[2]);
-        for (int d = 0; d < 2; d++)
+        double force[3], torque[3];
+        const bool wet = water_on_body(run, b, force, torque);
+        const double reach = body_reach(run, body), disc = rho * M_PI * silt_square(reach);
+        // added mass and inertia: those of the disc around it, in space half the sphere's water
+        const double added = space ? 2.0 / 3.0 * disc * reach : disc, turned = (space ? 0.2 : 0.25) * added * silt_square(reach);
+        const bool held = run->scene->body[b].motion != MOTION_FREE; // no loop
+        const double share = held ? 1 : most / (1 + ratio * added / body->mass);
+        const double twist = held ? 1 : most / (1 + ratio * turned / body_inertia(run, body));
+        for (int d = 0; d < 3; d++) {
             body->force[d] = wet ? body->force[d] + share * (force[d] - body->force[d]) : 0;
-        body->torque[2] = wet ? body->torque[2] + twist * (torque - body->torque[2]) : 0;
+            body->torque[d] = wet ? body->torque[d] + twist * (torque[d] - body->torque[d]) : 0;
+        }
     }
     SILT_RESERVE(run->body_before, run->body_before_capacity, bodies->count + 1);
     memcpy(run->body_before, bodies->body, (size_t)bodies->count * sizeof *bodies->body);
@@ -87,6 +108,8 @@ silt_status silt_run_grains(silt_run *run, int n, double before, bool again, sil
     silt_coupling_dem.load(run->coupling, &moving, &run->mesh, run->dt);
     if (run->scene->grains.random_walk && run->fluid.mu)
         silt_coupling_dem.walk(run->coupling, &run->nodes, &run->mesh, run->fluid.mu, run->dt, run->step);
+    if (run->scene->grains.gusts > 0 && run->fluid.mu)
+        silt_coupling_dem.gusts(run->coupling, &run->nodes, &run->mesh, run->fluid.mu, run->time + run->dt);
     if (!again && !silt_run_set_up_due(run))
         silt_coupling_dem.keep(run->coupling);
     SILT_TRY(silt_coupling_dem.start(run->coupling, n, err));

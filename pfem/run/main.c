@@ -202,13 +202,17 @@ static silt_status main_draw(const main_arguments *a, silt_error *err) {
     SILT_TRY(main_out(a, err));
     if (a->draw.to && mkdir(a->draw.to, 0777) != 0 && errno != EEXIST)
         return silt_fail(err, SILT_FAILED, "%s: cannot be made (%s)", a->draw.to, strerror(errno));
-    return silt_draw(a->path, &a->draw, stdout, err);
+    const silt_pictures *pictures;
+    SILT_TRY(silt_pictures_load(&pictures, err));
+    return pictures->draw(a->path, &a->draw, stdout, err);
 }
 
 static silt_status main_report(const main_arguments *a, silt_error *err) {
     SILT_TRY(main_out(a, err));
     const silt_report_def def = {.path = a->run.out, .draw = a->draw};
-    return silt_report(a->path, &def, stdout, err);
+    const silt_pictures *pictures;
+    SILT_TRY(silt_pictures_load(&pictures, err));
+    return pictures->report(a->path, &def, stdout, err);
 }
 
 static silt_status main_info(const main_arguments *a, silt_error *err) {

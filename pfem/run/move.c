@@ -1,11 +1,28 @@
 // nodes to their new places: water with its velocity, drops in free flight, inlets back to their line, bodies with theirs
 #include "run.h"
 
+// a body on a path has the velocity and spin that carry it to its place at the end of the step
+static void bodies_ahead(const silt_run *run, silt_body_state *bodies) {
+    for (int b = 0; b < bodies->count; b++) {
+        const silt_body_def *def = &run->scene->body[b];
+        double from[4], to[4];
+        if (def->motion != MOTION_PRESCRIBED || !(run->dt > 0))
+            continue;
+        silt_path_at(&def->path, run->time, from);
+        silt_path_at(&def->path, run->time + run->dt, to);
+        for (int d = 0; d < 3; d++)
+            bodies->body[b].v[d] = (to[d] - from[d]) / run->dt;
+        bodies->body[b].w[2] = (to[3] - from[3]) / run->dt;
+    }
+}
+
 void silt_run_prescribe(silt_run *run) {
     const silt_scene *scene = run->scene;
     silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
-    const silt_body_state *bodies = run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
+    silt_body_state *bodies = run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
+    if (bodies)
+        bodies_ahead(run, bodies);
     for (int i = 0; i < nodes->count; i++) {
         double *v = nodes->v + D * i;
         if (nodes->kind[i] == NODE_INLET) {
@@ -15,8 +32,16 @@ void silt_run_prescribe(silt_run *run) {
                 v[d] = factor * inlet->velocity[d];
         } else if (nodes->kind[i] == NODE_BODY && bodies) {
             const struct silt_body *body = &bodies->body[nodes->owner[i]];
-            v[0] = body->v[0] - body->w[2] * (nodes->x[2 * i + 1] - body->x[1]);
-            v[1] = body->v[1] + body->w[2] * (nodes->x[2 * i] - body->x[0]);
+            const double *x = nodes->x + D * i;
+            if (D == 3)
+                for (int d = 0; d < 3; d++) {
+                    const int p = (d + 1) % 3, q = (d + 2) % 3;
+                    v[d] = body->v[d] + body->w[p] * (x[q] - body->x[q]) - body->w[q] * (x[p] - body->x[p]);
+                }
+            else {
+                v[0] = body->v[0] - body->w[2] * (x[1] - body->x[1]);
+                v[1] = body->v[1] + body->w[2] * (x[0] - body->x[0]);
+            }
         } else if (nodes->kind[i] == NODE_CORNER) {
             double wall[3] = {0};
             if (nodes->owner[i] >= 0)
@@ -112,6 +137,16 @@ static void place_bodies(silt_run *run) {
         if (nodes->kind[i] != NODE_BODY)
             continue;
         const struct silt_body *old = &before[nodes->owner[i]], *now = &bodies->body[nodes->owner[i]];
+        if (now->solid) {
+            double x[3];
+            for (int d = 0; d < 3; d++)
+                x[d] = run->x_old[3 * i + d] - old->x[d];
+            silt_turn(old->q, true, x, x);
+            silt_turn(now->q, false, x, x);
+            for (int d = 0; d < 3; d++)
+                nodes->x[3 * i + d] = now->x[d] + x[d];
+            continue;
+        }
         // turn from old to new about z: q_now * conj(q_old)
         const double w = now->q[0] * old->q[0] + now->q[3] * old->q[3], z = now->q[3] * old->q[0] - now->q[0] * old->q[3];
         const double c = 1 - 2 * z * z, s = 2 * w * z;

@@ -86,7 +86,7 @@ struct silt_run {
     int n_body_before, body_before_capacity;
     struct silt_body *body_before; // owned, poses at the start of the step
     int body_load_capacity;
-    double (*body_load)[3];        // owned, N and N m per m, force and torque of the step before
+    double (*body_load)[6];        // owned, N and N m per m, force and torque of the step before
     double *x_old;   // owned, 2 per node, positions at the start of the step
     double *v_old, *debt_old; // owned, 2 and 1 per node, velocities and debts at the start of the step
     int *wall_before;  // owned, first wall of every node before contact

@@ -1,5 +1,6 @@
 // the state at t = 0: box of the scene, bed, bodies, the cloud of nodes and the first mesh
 #include "run.h"
+#include "solid.h"
 
 #define WATER_MADE 0.1 // largest share by which the first cells may miss the regions without a word
 
@@ -10,7 +11,16 @@ static bool run_solid(const void *context, const double *x, double margin) {
     const silt_barrier bodies = {.bodies = barrier->bodies};
     if (silt_barrier_contains(&bodies, x))
         return true;
-    for (int k = 0; margin > 0 && barrier->bodies && k < 8; k++) {
+    for (int b = 0; margin > 0 && barrier->bodies && b < barrier->bodies->count && barrier->bodies->body[b].solid; b++) {
+        const struct silt_body *body = &barrier->bodies->body[b];
+        double local[3] = {x[0] - body->x[0], x[1] - body->x[1], x[2] - body->x[2]};
+        if (silt_length(3, local) > body->solid->radius + margin)
+            continue;
+        silt_turn(body->q, true, local, local);
+        if (silt_solid_distance(body->solid, local, NULL, NULL) < margin)
+            return true;
+    }
+    for (int k = 0; margin > 0 && barrier->bodies && barrier->bodies->count && !barrier->bodies->body[0].solid && k < 8; k++) {
         const double probe[2] = {x[0] + margin * cos(k * M_PI / 4), x[1] + margin * sin(k * M_PI / 4)};
         if (silt_barrier_contains(&bodies, probe))
             return true;
@@ -102,7 +112,7 @@ void silt_run_box(silt_run *run) {
     for (int i = 0; i < run->nodes.count; i++)
         box_span(lo, hi, run->nodes.x + D * i, D, 0);
     for (int b = 0; b < scene->n_body; b++)
-        box_span(lo, hi, scene->body[b].at, D, silt_max(scene->body[b].scale, scene->body[b].height));
+        box_span(lo, hi, scene->body[b].at, D, silt_max(scene->body[b].scale, silt_max(scene->body[b].height, scene->body[b].depth)));
     for (int k = 0; k < silt_scene_grains(scene); k++)
         box_span(lo, hi, silt_scene_grain(scene, k)->at, D, silt_scene_grain(scene, k)->diameter);
     // nothing holds water that has no walls: it may go far
@@ -195,9 +205,16 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
         const struct silt_body *body = &run->barrier.bodies->body[b];
         const double c = 1 - 2 * silt_square(body->q[3]), s = 2 * body->q[0] * body->q[3];
         const int n = silt_coupling_dem.outline(run->coupling, b, scene->fluid.size, NULL, 0);
-        double *point = silt_alloc(2 * (size_t)n + 2, sizeof *point);
+        double *point = silt_alloc(3 * (size_t)n + 3, sizeof *point);
         silt_coupling_dem.outline(run->coupling, b, scene->fluid.size, point, n);
-        for (int k = 0; k < n; k++) {
+        for (int k = 0; k < n && body->solid; k++) {
+            double x[3];
+            silt_turn(body->q, false, point + 3 * k, x);
+            for (int d = 0; d < 3; d++)
+                x[d] += body->x[d];
+            silt_nodes_add(&run->nodes, NODE_BODY, b, x);
+        }
+        for (int k = 0; k < n && !body->solid; k++) {
             const double x[2] = {body->x[0] + c * point[2 * k] - s * point[2 * k + 1],
                                  body->x[1] + s * point[2 * k] + c * point[2 * k + 1]};
             silt_nodes_add(&run->nodes, NODE_BODY, b, x);

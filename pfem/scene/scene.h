@@ -255,7 +255,9 @@ typedef struct silt_grains_def {
     silt_series sieve;    // diameter in m, share of the mass that passes, of the parcels; n_row 0: all alike
     double width;         // m, accounting width in 2-D; 0: (2/3)(0.82) d/(1 - n) of the parcel, or 5 d without bed
     double kernel;        // m, width of the porosity kernel; 0: max(3 d, 2 h)
-    bool kernel_layers;   // the kernel takes means along x in layers, 2-D, default false
+    bool across;          // 3-D, with kernel_layers: what goes through a side of the walls in y comes in at the other, default false
+    double gusts;         // s, 0: none; how long each lasts
+    bool kernel_layers;   // the kernel takes means along x (3-D: and y) in layers, default false
     double added_mass;    // 0, coefficient, of the displaced water's mass; spheres: 0.5
     silt_lift_law lift;   // lift: none | saffman
     bool viscous_force;   // V div tau, default false
@@ -286,24 +288,60 @@ typedef struct silt_contact_def {
 } silt_contact_def;
 
 typedef enum {
-    SHAPE_BOX = 1, // scale wide, height high
-    SHAPE_DISC,    // scale is the diameter
-    SHAPE_POLYGON, // points relative to any origin, simple polygon; scaled so that its width is `scale` if scale > 0
-    SHAPE_TEMPLE,  // columns under a roof, width `scale`; made in dem-coupling/shape.c
+    SHAPE_BOX = 1,  // scale wide, height high, in 3-D depth deep
+    SHAPE_DISC,     // 2-D, scale is the diameter
+    SHAPE_POLYGON,  // points relative to any origin, simple polygon; scaled so that its width is `scale` if scale > 0; 3-D: a prism
+                    // over points [x, z], depth deep
+    SHAPE_TEMPLE,   // columns under a roof, width `scale`; made in dem-coupling/shape.c and form.c
+    SHAPE_SPHERE,   // 3-D, scale is the diameter
+    SHAPE_CYLINDER, // 3-D, upright, scale is the diameter, height the length
+    SHAPE_CAPSULE,  // lies along x, scale long, height thick
+    SHAPE_WEDGE,    // isosceles, its edge down, scale wide, height high
+    SHAPE_TETRAPOD, // 3-D, scale high, one leg up
+    SHAPE_SURFACE,  // 3-D, a closed surface from `file`; its width made `scale` if scale > 0
 } silt_shape;
-typedef enum { MOTION_FREE = 0, MOTION_FIXED } silt_motion;
+typedef enum { MOTION_FREE = 0, MOTION_FIXED, MOTION_PRESCRIBED } silt_motion;
+/** components of a body's motion, bits of silt_body_def.held */
+enum { HELD_X = 1, HELD_Y = 2, HELD_Z = 4, HELD_ANGLE = 8, HELD_ALL = 15 };
+/** a spring or line between a point of the body and a point in space */
+typedef struct silt_spring_def {
+    double at[3];     // m, the point of the body where it is at the start
+    double to[3];     // m
+    double stiffness; // N/m; 2-D: per metre of width, as all forces
+    double damping;   // N s/m, of the speed at which its length changes
+    double length;    // m, at rest; after reading never NaN
+    bool line;        // pulls, does not push
+} silt_spring_def;
+/** until when a body is held */
+typedef struct silt_release_def {
+    bool on;
+    double time;  // s; NaN: not by time
+    double force; // N, of all that acts on it; NaN: not by force
+} silt_release_def;
 typedef struct silt_body_def {
     char *name; // [a-z][a-z0-9_]*, unique
     silt_shape shape;
     double at[3];   // of the centroid, m
     double angle;   // degrees
+    double axis[3]; // 3-D: what the angle turns about
     double scale;   // m, width
-    double height;  // m, box only; 0: scale
+    double height;  // m; 0: as the shape says
+    double depth;   // m, 3-D, along y; 0: scale
     double density; // kg/m3
     double velocity[3];
+    double spin[3]; // rad/s, 3-D, at the start
     silt_motion motion;
+    silt_series path;  // MOTION_PRESCRIBED: a path (silt_path_at)
+    double path_scale; // 1, factor on the numbers of its file
+    silt_baseline baseline; // of accelerations
+    int held;          // HELD_ bits: components of the motion that are none
+    int n_spring;
+    silt_spring_def *spring; // owned
+    silt_release_def release;
+    double clump_error; // m, how far the spheres of its contacts may leave its surface; 0: as many as are usual
     int n_point;
     double *point; // owned, polygon only, 3 per point, counter-clockwise after reading
+    char *file;    // owned, surface only
 } silt_body_def;
 
 typedef enum {

@@ -35,6 +35,8 @@ uint64_t silt_scene_hash(const silt_scene *scene) {
         hash = hash_series(hash, &scene->wall[i].motion);
         hash = hash_file(hash, scene->wall[i].surface);
     }
+    for (int i = 0; i < scene->n_body; i++)
+        hash = hash_series(hash, &scene->body[i].path);
     for (int i = 0; i < fluid->n_region; i++)
         hash = hash_outline(hash, &fluid->region[i]);
     hash = hash_series(hash, &scene->grains.sieve);

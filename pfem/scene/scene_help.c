@@ -143,6 +143,8 @@ static const char *help_type(const silt_key *key) {
     case KEY_WORD:
     case KEY_SIGN:
         return "word";
+    case KEY_SET:
+        return "list of words";
     case KEY_TEXT:
         return "text";
     case KEY_NAME:
@@ -187,6 +189,7 @@ char *silt_key_allowed(const silt_key *key, int dimension) {
     if (!to)
         return silt_text("%s", help_type(key));
     if (key->words) {
+        fprintf(to, key->kind == KEY_SET ? "a list of any of " : "");
         help_words(to, key->words);
     } else if (key->kind == KEY_BOX) {
         fprintf(to, dimension == 3 ? "two corners [[x0, y0, z0], [x1, y1, z1]] with x0 < x1, y0 < y1 and z0 < z1"

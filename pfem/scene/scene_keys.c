@@ -48,8 +48,12 @@ static const silt_word drag_words[] = {
 static const silt_word arrange_words[] = {{"random", ARRANGE_RANDOM}, {"lattice", ARRANGE_LATTICE}, {0}};
 static const silt_word lift_words[] = {{"none", LIFT_NONE}, {"saffman", LIFT_SAFFMAN}, {0}};
 static const silt_word shape_words[] = {
-    {"box", SHAPE_BOX}, {"disc", SHAPE_DISC}, {"polygon", SHAPE_POLYGON}, {"temple", SHAPE_TEMPLE}, {0}};
-static const silt_word motion_words[] = {{"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {0}};
+    {"box", SHAPE_BOX},           {"disc", SHAPE_DISC},       {"polygon", SHAPE_POLYGON}, {"temple", SHAPE_TEMPLE},     {"sphere", SHAPE_SPHERE},
+    {"cylinder", SHAPE_CYLINDER}, {"capsule", SHAPE_CAPSULE}, {"wedge", SHAPE_WEDGE},     {"tetrapod", SHAPE_TETRAPOD}, {"surface", SHAPE_SURFACE},
+    {0}};
+static const silt_word motion_words[] = {
+    {"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {"prescribed", MOTION_PRESCRIBED}, {0}};
+static const silt_word held_words[] = {{"x", HELD_X}, {"y", HELD_Y}, {"z", HELD_Z}, {"angle", HELD_ANGLE}, {0}};
 static const silt_word baseline_words[] = {
     {"none", BASELINE_NONE}, {"velocity", BASELINE_VELOCITY}, {"place", BASELINE_PLACE}, {0}};
 static const silt_word front_words[] = {{"x", 1}, {"-x", -1}, {0}};
@@ -470,9 +474,12 @@ static const silt_key grains_rows[] = {
      .doc = "accounting width; 0: (2/3)(0.82) d/(1 - n) of the parcel; without a bed 0.91 d with regions (n = 0.4), else 5 d"},
     {"kernel", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, kernel),
      .doc = "width of the porosity kernel; 0: the larger of 3 d and 2 h"},
-    {"kernel_layers", KEY_SWITCH, .fallback = "false", .flags = KEY_PLANE, AT(silt_grains_def, kernel_layers),
-     .doc = "the kernel takes means along the whole of x, in layers as thick as `kernel`: for level beds in periodic channels, whose water is the "
-            "same along x in the mean and changes within a grain's height over the bed"},
+    {"kernel_layers", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, kernel_layers),
+     .doc = "the kernel takes means along the whole of x (3-D: and y), in layers as thick as `kernel`: for level beds in periodic channels, whose "
+            "water is the same along x (and y) in the mean and changes within a grain's height over the bed"},
+    {"across", KEY_SWITCH, .fallback = "false", .flags = KEY_SPACE, AT(silt_grains_def, across),
+     .doc = "grains that go through one end of the walls in y come in at the other: a channel without sides; the water keeps its own, which should "
+            "be slip. Only with kernel_layers, whose means do not know where in y a grain is"},
     {"added_mass", KEY_NUMBER, .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, added_mass),
      .doc = "share of the displaced water that is accelerated along; spheres: 0.5"},
     {"lift", KEY_WORD, .fallback = "none", .words = lift_words, AT(silt_grains_def, lift), .doc = "force across the water's shear"},
@@ -483,6 +490,9 @@ static const silt_key grains_rows[] = {
     {"eddy_limit", KEY_NUMBER, .fallback = "0", .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_grains_def, eddy_limit),
      .doc = "share of grains in the water at which eddies have no room: the mixing length counts the way to the wall times 1 - share/limit "
             "(Li and Sawamoto 1995; 0.6); 0: grains do not hinder eddies"},
+    {"gusts", KEY_NUMBER, .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(silt_grains_def, gusts),
+     .doc = "how long a gust lasts at a grain, such as the depth of a stream over its mean velocity: the eddies that the mesh does not show, added "
+            "to the water's velocity in the drag (docs/grains.md); 0: none"},
     {"random_walk", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, random_walk),
      .doc = "suspended grains wander with the eddies that the mesh does not show; random numbers by fluid.seed"},
     {"pick_up", KEY_SWITCH, .fallback = "false", AT(silt_grains_def, pick_up),
@@ -514,21 +524,66 @@ static const silt_key contact_rows[] = {
     {0}};
 TABLE(contact, "the contact block", silt_contact_def, -1);
 
+static const silt_key spring_rows[] = {
+    {"at", KEY_POINT, .unit = "m", AT(silt_spring_def, at), .doc = "point of the body that it is tied to, where it is at the start"},
+    {"to", KEY_POINT, .unit = "m", AT(silt_spring_def, to), .doc = "point in space that it leads to"},
+    {"stiffness", KEY_NUMBER, .unit = "N/m", NOT_NEGATIVE, AT(silt_spring_def, stiffness),
+     .doc = "force per change of its length (2-D: per metre of width)"},
+    {"damping", KEY_NUMBER, .unit = "N s/m", .fallback = "0", NOT_NEGATIVE, AT(silt_spring_def, damping),
+     .doc = "force per speed at which its length changes"},
+    {"length", KEY_NUMBER, .unit = "m", .fallback = ".nan", NOT_NEGATIVE, AT(silt_spring_def, length),
+     .doc = "without force; default: what it has at the start"},
+    {"line", KEY_SWITCH, .fallback = "false", AT(silt_spring_def, line), .doc = "a mooring line: it pulls and does not push"},
+    {0}};
+TABLE(spring, "a spring", silt_spring_def, -1);
+
+static const silt_key release_rows[] = {
+    {"time", KEY_NUMBER, .unit = "s", .fallback = ".nan", NOT_NEGATIVE, AT(silt_body_def, release.time), .doc = "from which it is free"},
+    {"force", KEY_NUMBER, .unit = "N", .fallback = ".nan", NOT_NEGATIVE, AT(silt_body_def, release.force),
+     .doc = "that sets it free: of water, contacts, springs and weight together, in any direction (2-D: per metre of width)"},
+    {0}};
+TABLE(release, "until when the body is held", silt_body_def, -1);
+
 static const silt_key body_rows[] = {
     {"name", KEY_NAME, AT(silt_body_def, name), .doc = "begins its columns in history.csv"},
-    {"shape", KEY_WORD, .flags = KEY_SELECTOR, .words = shape_words, AT(silt_body_def, shape), .doc = "outline"},
+    {"shape", KEY_WORD, .flags = KEY_SELECTOR, .words = shape_words, AT(silt_body_def, shape),
+     .doc = "outline; disc in 2-D only, sphere, cylinder, tetrapod and surface in 3-D only"},
     {"at", KEY_POINT, .unit = "m", AT(silt_body_def, at), .doc = "centroid"},
-    {"angle", KEY_NUMBER, .unit = "degrees", .fallback = "0", AT(silt_body_def, angle), .doc = "counter-clockwise"},
+    {"angle", KEY_NUMBER, .unit = "degrees", .fallback = "0", AT(silt_body_def, angle),
+     .doc = "counter-clockwise, in 3-D seen from the tip of the axis"},
+    {"axis", KEY_POINT, .flags = KEY_SPACE, .fallback = "[0, 0, 1]", AT(silt_body_def, axis), .doc = "what the angle turns about"},
     {"scale", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_body_def, scale),
-     .doc = "width, or diameter of a disc; 0: a polygon as its points are, the others need it"},
-    {"height", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, .when = ONLY(SHAPE_BOX),
-     AT(silt_body_def, height), .doc = "of a box; 0: as wide as high"},
+     .doc = "width, diameter of a disc, sphere or cylinder, length of a capsule, height of a tetrapod; 0: a polygon or surface as it is, "
+            "the others need it"},
+    {"height", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE,
+     .when = ONLY(SHAPE_BOX) | ONLY(SHAPE_CYLINDER) | ONLY(SHAPE_CAPSULE) | ONLY(SHAPE_WEDGE), AT(silt_body_def, height),
+     .doc = "of a box or wedge, length of a cylinder, thickness of a capsule; 0: as the scale, of a capsule half of it"},
+    {"depth", KEY_NUMBER, .unit = "m", .fallback = "0", .flags = KEY_SPACE, .low = 0, .high = HUGE_VAL,
+     .when = ONLY(SHAPE_BOX) | ONLY(SHAPE_POLYGON) | ONLY(SHAPE_TEMPLE) | ONLY(SHAPE_WEDGE), AT(silt_body_def, depth),
+     .doc = "along y; 0: as wide as deep"},
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_body_def, density), .doc = "mean of the body"},
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_body_def, velocity), .doc = "at the start"},
+    {"spin", KEY_POINT, .unit = "rad/s", .flags = KEY_SPACE, .fallback = "[0, 0, 0]", AT(silt_body_def, spin),
+     .doc = "angular velocity at the start"},
     {"motion", KEY_WORD, .fallback = "free", .words = motion_words, AT(silt_body_def, motion),
-     .doc = "free to move, or held"},
+     .doc = "free to move, held where it is, or moved by `path` whatever acts on it"},
+    {"path", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_body_def, path),
+     .doc = "CSV file beside the scene: time in s, then any of x, y, z in m and angle in degrees from `at` and `angle`, or of their "
+            "accelerations, as walls.motion says; only with motion: prescribed"},
+    {"path_scale", KEY_NUMBER, .fallback = "1", AT(silt_body_def, path_scale), .doc = "factor on all columns of `path` but time"},
+    {"baseline", KEY_WORD, .fallback = "none", .words = baseline_words, AT(silt_body_def, baseline), .doc = "of `path`, as walls.baseline says"},
+    {"held", KEY_SET, .flags = KEY_OPTIONAL, .words = held_words, AT(silt_body_def, held),
+     .doc = "components of a free body's motion that are none: [x, angle] leaves heave only, [x, y] roll; z in 3-D only"},
+    {"springs", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &spring_table, MANY(silt_body_def, n_spring, spring),
+     .doc = "springs and mooring lines of a free body"},
+    {"release", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &release_table, .presence = PRESENT_FLAG, .present = offsetof(silt_body_def, release.on),
+     .doc = "a free body that is held until a time or until a force acts on it"},
+    {"clump_error", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_body_def, clump_error),
+     .doc = "how far the spheres of its contacts may leave its surface; 0: as usual"},
     {"points", KEY_POLYGON, .unit = "m", .when = ONLY(SHAPE_POLYGON), MANY(silt_body_def, n_point, point),
-     .doc = "corners of a polygon about any origin"},
+     .doc = "corners of a polygon about any origin, in 3-D [x, z] of a prism along y"},
+    {"file", KEY_SURFACE, .when = ONLY(SHAPE_SURFACE), AT(silt_body_def, file),
+     .doc = "closed surface, STL or gmsh, triangles counter-clockwise from outside"},
     {0}};
 TABLE(body, "a body", silt_body_def, offsetof(silt_body_def, shape));
 
@@ -668,7 +723,7 @@ static const silt_key scene_rows[] = {
     {"contact", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &contact_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, contact.on), AT(silt_scene, contact),
      .doc = "how solids touch; needed with a bed, grains or bodies"},
-    {"bodies", KEY_LIST, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &body_table, MANY(silt_scene, n_body, body),
+    {"bodies", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &body_table, MANY(silt_scene, n_body, body),
      .doc = "rigid objects"},
     {"gauges", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &gauge_table, MANY(silt_scene, n_gauge, gauge),
      .doc = "what is measured at every step"},

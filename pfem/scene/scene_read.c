@@ -386,6 +386,13 @@ static void read_row(read_state *state, const silt_key_table *table, const silt_
         if ((word = read_word(state, key, node, path)))
             memcpy(at, &word->value, sizeof word->value);
         break;
+    case KEY_SET:
+        if (node->kind != TREE_LIST)
+            read_refuse(state, node, key, path, "");
+        for (int i = 0; node->kind == TREE_LIST && i < node->n_item; i++)
+            if ((word = read_word(state, key, node->item[i], path)))
+                *(int *)at |= word->value;
+        break;
     case KEY_SIGN:
         if ((word = read_word(state, key, node, path)))
             *(double *)at = word->value;

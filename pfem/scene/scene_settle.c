@@ -220,6 +220,19 @@ static void settle_wall(silt_reader *reader, const silt_scene *scene, silt_wall 
     free(path);
 }
 
+// bodies -----------------------------------------------------------------------------------------------
+static void settle_body(silt_reader *reader, const silt_scene *scene, silt_body_def *body, int i) {
+    char *path = silt_text("bodies.%d", i);
+    settle_path(reader, silt_tree_find(reader->root, "%s", path), path, "path", &body->path, scene->dimension, body->path_scale,
+                body->baseline);
+    for (int k = 0; k < body->n_spring; k++) {
+        silt_spring_def *s = &body->spring[k];
+        const double way[3] = {s->to[0] - s->at[0], s->to[1] - s->at[1], s->to[2] - s->at[2]};
+        s->length = isnan(s->length) ? silt_length(3, way) : s->length;
+    }
+    free(path);
+}
+
 // formulas ---------------------------------------------------------------------------------------------
 static void settle_formula(silt_reader *reader, const silt_scene *scene, silt_formula *formula, const char *path) {
     static const char *const point[2][6] = {{"x", "y", "vx", "vy"}, {"x", "y", "z", "vx", "vy", "vz"}};
@@ -439,6 +452,8 @@ void silt_scene_settle(silt_reader *reader, silt_scene *scene) {
     settle_regions(reader, scene);
     for (int i = 0; i < scene->n_wall; i++)
         settle_wall(reader, scene, &scene->wall[i], i);
+    for (int i = 0; i < scene->n_body; i++)
+        settle_body(reader, scene, &scene->body[i], i);
     settle_fluid(reader, scene);
     settle_bed(reader, scene);
     settle_fills(reader, scene);

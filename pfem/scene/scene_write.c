@@ -119,6 +119,8 @@ static bool write_counts(const silt_key_table *table, const silt_key *key, const
         return !isnan(*(const double *)at);
     case KEY_SEGMENT:
         return memcmp(at, (const char *)at + 3 * sizeof(double), 3 * sizeof(double)) != 0;
+    case KEY_SET:
+        return *(const int *)at != 0;
     case KEY_PAIR:
         return ((const double *)at)[0] < ((const double *)at)[1];
     case KEY_TEXT:
@@ -186,6 +188,12 @@ static void write_value(write_state *state, const silt_key *key, const void *bas
     case KEY_WORD:
         memcpy(&number, at, sizeof number);
         fprintf(to, "%s", write_word(key, number));
+        break;
+    case KEY_SET:
+        for (const silt_word *word = key->words; word->text; word++)
+            if (*(const int *)at & word->value)
+                fprintf(to, "%s%s", number++ ? ", " : "[", word->text);
+        fputc(']', to);
         break;
     case KEY_SIGN:
         fprintf(to, "%s", write_word(key, (int)*(const double *)at));

@@ -1,31 +1,8 @@
 // surfaces that only gmsh can read, through a module that is loaded when one is met
 #include <dlfcn.h>
-#include <unistd.h>
 
 #include "gmsh_module.h"
 #include "wall.h"
-
-// beside the program, or in ../libexec/silt, as the worker is
-static void *module_open(char why[512]) {
-    char self[4096];
-    const ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-    self[n > 0 ? n : 0] = 0;
-    char *slash = strrchr(self, '/');
-    if (slash)
-        *slash = 0;
-    static const char *const place[] = {"%s/silt-gmsh.so", "%s/../silt-gmsh.so", "%s/../libexec/silt/silt-gmsh.so"};
-    snprintf(why, 512, "it was not built: libgmsh was not there");
-    for (int k = 0; k < 3; k++) {
-        char path[4200];
-        snprintf(path, sizeof path, k == 0 ? place[0] : k == 1 ? place[1] : place[2], self);
-        void *module = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-        if (module)
-            return module;
-        if (access(path, F_OK) == 0)
-            snprintf(why, 512, "%s", dlerror());
-    }
-    return NULL;
-}
 
 // ---- gmsh turns the triangles of each face as the face lies in its shape: they are turned alike here
 
@@ -101,14 +78,14 @@ static void turn_alike(silt_surface *s) {
 
 bool wall_gmsh_there(void) {
     char why[512];
-    return module_open(why) != NULL; // opened once more it is the same
+    return silt_module_open("silt-gmsh.so", why) != NULL;
 }
 
 silt_status wall_gmsh_read(const char *path, silt_surface *surface, silt_error *err) {
     char why[512];
-    void *module = module_open(why);
+    void *module = silt_module_open("silt-gmsh.so", why);
     if (!module)
-        return silt_fail(err, SILT_INPUT, "%s: found a file that needs the module silt-gmsh.so (%s), allowed without it: STL, .msh as text",
+        return silt_fail(err, SILT_INPUT, "%s: found a file that needs the module silt-gmsh.so (%s; it is made where libgmsh-dev is), allowed without it: STL, .msh as text",
                          path, why);
     silt_gmsh_reader *reader;
     *(void **)&reader = dlsym(module, "silt_gmsh_read");

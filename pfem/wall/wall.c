@@ -499,6 +499,7 @@ static void motion_take(silt_walls *walls, const silt_wall *wall, int w, double 
 
 void silt_walls_move(silt_walls *walls, const silt_scene *scene, double time, double dt) {
     struct silt_wall_index *index = walls->index;
+    walls->time = time;
     if (!index || !index->place)
         return;
     const int dim = wall_dim(walls);
