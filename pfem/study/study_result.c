@@ -33,8 +33,8 @@ static bool walls_rest(const silt_scene *scene) {
     return true;
 }
 
-// Openings, a bed, forces, tension and closed air hold or bring energy that the history does not tell: no sum then. Of water and grains
-// together the sum is known where nothing is driven from outside, of water beside them and beside bodies through the work done on it.
+// Openings, a bed, bodies, forces, tension and closed air hold or bring energy that the history does not tell: no sum then. Of water and grains
+// together the sum is known where nothing is driven from outside, of water beside walls that move through the work done on it.
 static result_energy energy_known(const silt_scene *scene) {
     const silt_fluid_def *fluid = &scene->fluid;
     result_energy known = {0};
@@ -43,6 +43,10 @@ static result_energy energy_known(const silt_scene *scene) {
     if (!closed)
         return known;
     const bool alone = walls_rest(scene) && scene->n_body == 0;
+    // of bodies that hit water the history has no energy
+    for (int i = 0; i < scene->n_body; i++)
+        if (scene->body[i].motion == MOTION_FREE)
+            return known;
     known.water = fluid->on;
     known.grains = scene->grains.on && alone;
     known.worked = fluid->on && !known.grains;
