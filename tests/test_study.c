@@ -286,15 +286,22 @@ static void test_slope(void **state) {
         *row = (study_row){0};
         // the last two do not count: a run that failed, an error of nought
         study_row_add(row, "status", "%s", k == 4 ? "failed" : "ok");
+        study_row_add(row, "odd", k % 2 ? "yes" : "no");
         study_row_add(row, "h", "%.17g", h);
         study_row_add(row, "e", "%.17g", k == 4 ? 1000 : k == 5 ? 0 : 3 * h * h * sqrt(h));
     }
     double slope, at_one;
-    assert_int_equal(study_slope(&table, "h", "e", &slope, &at_one), 4);
+    assert_int_equal(study_slope(&table, "h", "e", NULL, NULL, &slope, &at_one), 4);
     near(slope, 2.5, 1e-12, "order");
     near(at_one, 3, 1e-12, "error at h = 1");
-    assert_int_equal(study_slope(&table, "absent", "e", &slope, &at_one), 0);
+    assert_int_equal(study_slope(&table, "absent", "e", NULL, NULL, &slope, &at_one), 0);
     assert_true(isnan(slope));
+    // of the rows of one value: e = 3 h^2.5 all the same
+    assert_string_equal(study_distinct(&table, "odd", 0), "no");
+    assert_string_equal(study_distinct(&table, "odd", 1), "yes");
+    assert_null(study_distinct(&table, "odd", 2));
+    assert_int_equal(study_slope(&table, "h", "e", "odd", "yes", &slope, &at_one), 2);
+    near(slope, 2.5, 1e-12, "order of the odd rows");
     study_table_clear(&table);
 }
 

@@ -69,7 +69,7 @@ typedef struct study_seek {
 typedef enum { PLOT_TIME = 1, PLOT_ORDER, PLOT_COST, PLOT_MAP } study_plot_kind;
 typedef struct study_plot {
     study_plot_kind kind;
-    char *name, *x, *y, *check; // owned
+    char *name, *x, *y, *check, *by; // owned
 } study_plot;
 
 typedef enum { COMBINE_GRID = 0, COMBINE_TOGETHER } study_combine;
@@ -159,8 +159,15 @@ silt_status study_collect(const study *s, const char *out, study_table *table, s
 void study_table_clear(study_table *table);
 /** plots that are asked for, or those that suit; a missing gnuplot is told to `to`, and the CSV stays */
 silt_status study_plots(const study *s, const char *out, const study_table *table, FILE *to, silt_error *err);
-/** a least-squares line through the logarithms of what is positive in both; @return points used */
-int study_slope(const study_table *table, const char *x, const char *y, double *slope, double *at_one);
+/** a least-squares line through the logarithms of what is positive in both; by: of the rows that have this value there, NULL: of all.
+ * @return points used */
+int study_slope(const study_table *table, const char *x, const char *y, const char *by, const char *value, double *slope, double *at_one);
+/** the k-th of the different values in a column, in the order of the rows; NULL: there are no more (by NULL: one, "") */
+const char *study_distinct(const study_table *table, const char *by, int k);
+/** the row is of that value */
+bool study_row_of(const study_row *row, const char *by, const char *value);
+/** columns that a plot is drawn over; y is the caller's to free */
+void study_axes(const study *s, const study_table *table, const study_plot *plot, const char **x, char **y);
 /** OUT/study.md: maps in characters, reasons, orders; the short form to `to` */
 silt_status study_report(const study *s, const char *out, const study_table *table, FILE *to, silt_error *err);
 

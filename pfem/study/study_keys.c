@@ -67,6 +67,7 @@ static const silt_key plot_rows[] = {
     {"check", KEY_TEXT, .flags = KEY_OPTIONAL, AT(study_plot, check), .doc = "whose error; default: the first check"},
     {"x", KEY_TEXT, .flags = KEY_OPTIONAL, AT(study_plot, x),
      .doc = "column of study.csv; default: the first range, for cost nodes"},
+    {"by", KEY_TEXT, .flags = KEY_OPTIONAL, AT(study_plot, by), .doc = "column of study.csv: a line, with its own order, for each of its values; for order and cost"},
     {"y", KEY_TEXT, .flags = KEY_OPTIONAL, AT(study_plot, y), .doc = "column of study.csv, for map; default: the second range"},
     {0}};
 static const silt_key_table plot_table = {"a plot", sizeof(study_plot), plot_rows, -1, false};

@@ -166,14 +166,18 @@ static void report_sought(FILE *to, const study *s, const char *out) {
 static void report_orders(FILE *to, const study *s, const study_table *table) {
     for (int i = 0; i < s->n_plot; i++) {
         const study_plot *plot = &s->plot[i];
-        if ((plot->kind != PLOT_ORDER || !plot->check) && plot->kind != PLOT_COST)
+        const char *x, *value;
+        char *y;
+        if (plot->kind != PLOT_ORDER && plot->kind != PLOT_COST)
             continue;
-        const char *x = plot->x ? plot->x : plot->kind == PLOT_COST ? "nodes" : s->n_range ? s->range[0].key : s->seek.key;
-        char *y = plot->kind == PLOT_COST ? silt_text("cpu_seconds") : silt_text("%s_error", plot->check);
-        double slope, at_one;
-        const int n = study_slope(table, x, y, &slope, &at_one);
-        if (n > 1 && isfinite(slope))
-            fprintf(to, "%s: %s goes with %s to the power %.2f (%d runs)\n", plot->name, y, x, slope, n);
+        study_axes(s, table, plot, &x, &y);
+        for (int k = 0; y && (value = study_distinct(table, plot->by, k)); k++) {
+            double slope, at_one;
+            const int n = study_slope(table, x, y, plot->by, value, &slope, &at_one);
+            if (n > 1 && isfinite(slope))
+                fprintf(to, "%s: %s goes with %s to the power %.2f (%d runs%s%s%s%s)\n", plot->name, y, x, slope, n, plot->by ? ", " : "", plot->by ? plot->by : "",
+                        plot->by ? " = " : "", value);
+        }
         free(y);
     }
 }
