@@ -156,8 +156,9 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
             snprintf(why, sizeof why, "%s", err ? err->text : "");
             if (err)
                 *err = (silt_error){0};
-            return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s gave up after %d tries, the last with dt = %.3g s: %s",
-                             (long long)run->step + 1, run->time, attempt + 1, run->dt, why);
+            return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s gave up after %d tries, the last with dt = %.3g s%s: %s",
+                             (long long)run->step + 1, run->time, attempt + 1, run->dt,
+                             least ? ", which is one of the grains' and cannot be halved (contact.step, contact.youngs_modulus)" : "", why);
         }
         if (err)
             *err = (silt_error){0};
