@@ -41,8 +41,7 @@ static const silt_key bounds_rows[] = {
     {"mass", KEY_NUMBER, .fallback = "0.05", POSITIVE, AT(study, bounds.mass), .doc = "the same with the volume that is owed: what is really lost or gained"},
     {"sediment", KEY_NUMBER, .fallback = "1e-9", POSITIVE, AT(study, bounds.sediment), .doc = "largest `worst_sediment_error`"},
     {"energy", KEY_NUMBER, .fallback = "0.01", POSITIVE, AT(study, bounds.energy),
-     .doc = "largest energy above that at the start and the work done from outside, as a share of what could move; a run that told of too large cells is "
-            "warned, not wrong"},
+     .doc = "largest energy above that at the start and the work done from outside, as a share of what could move; a run that warned is no silent breach"},
     {0}};
 static const silt_key_table bounds_table = {"what a run must keep", 0, bounds_rows, -1, false};
 
