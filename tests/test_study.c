@@ -211,6 +211,7 @@ static void test_statuses(void **state) {
     ends(NULL, sound, "warning: a\nscene.yaml:1:2: key 'a': found", (study_end){.code = SILT_INPUT}, RUN_REFUSED, "scene.yaml:1:2: key 'a'");
     ends(SUMMARY("0", "1e-3"), sound, "step 3 gave up\nthe last checkpoint", (study_end){.code = SILT_FAILED}, RUN_FAILED, "step 3 gave up");
     ends(NULL, sound, "", (study_end){.code = SILT_FAILED}, RUN_CRASHED, "exit code 1 without a word");
+    ends(SUMMARY("0", "0"), sound, "stopped by time.wall", (study_end){.code = SILT_STOPPED}, RUN_UNFINISHED, "stopped by time.wall");
     ends(NULL, sound, "", (study_end){.code = 77}, RUN_CRASHED, "exit code 77");
     ends(NULL, sound, "", good, RUN_CRASHED, "no summary.json");
     ends(NULL, sound, "malloc: corrupted", (study_end){.code = -1, .signal = 11}, RUN_CRASHED, "signal 11: malloc: corrupted");

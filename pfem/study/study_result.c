@@ -293,6 +293,8 @@ void study_result(const study *s, const char *out, const char *log, const study_
         snprintf(reason, sizeof reason, "ended by signal %d%s%s", end->signal, *why ? ": " : "", why);
     } else if (end->code == SILT_INPUT)
         status = RUN_REFUSED;
+    else if (end->code == SILT_STOPPED)
+        status = RUN_UNFINISHED; // by time.wall, or a signal
     else if ((end->code == SILT_FAILED && !*reason) || (end->code != SILT_OK && end->code != SILT_FAILED) || !summary) {
         status = RUN_CRASHED;
         snprintf(reason, sizeof reason, end->code ? "exit code %d without a word" : "no summary.json", end->code);
