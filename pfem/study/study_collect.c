@@ -103,11 +103,13 @@ const char *study_distinct(const study_table *table, const char *by, int k) {
     return NULL;
 }
 
-int study_slope(const study_table *table, const char *x, const char *y, const char *by, const char *value, double *slope, double *at_one) {
+int study_slope(const study_table *table, const char *x, const char *y, const char *by, const char *value,
+                double *slope, double *at_one) {
     double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
     for (int i = 0; i < table->n; i++) {
         const double a = study_row_number(&table->row[i], x), b = study_row_number(&table->row[i], y);
-        if (study_row_status(&table->row[i]) > RUN_WARNED || !study_row_of(&table->row[i], by, value) || !(a > 0) || !(b > 0) || !isfinite(a) || !isfinite(b))
+        if (study_row_status(&table->row[i]) > RUN_WARNED || !study_row_of(&table->row[i], by, value) || !(a > 0) ||
+            !(b > 0) || !isfinite(a) || !isfinite(b))
             continue;
         const double u = log(a), v = log(b);
         n++;

@@ -1,4 +1,5 @@
-// what a run left, held against what a run must keep: numbers that are finite, volume, sediment, energy; then its status and reason
+// what a run left, held against what a run must keep: numbers that are finite, volume, sediment, energy; then its
+// status and reason
 #include <libfyaml.h>
 #include <sys/stat.h>
 
@@ -18,13 +19,15 @@ typedef struct result_history {
 
 // energies that the history can add up: of what moves, less what came from outside
 typedef struct result_energy {
-    bool water, grains;  // counted
-    bool worked;         // external_work is all that came from outside
-    int column[6];       // kinetic, potential, owed, external_work, grain_kinetic, grain_potential
+    bool water, grains; // counted
+    bool worked;        // external_work is all that came from outside
+    int column[6];      // kinetic, potential, owed, external_work, grain_kinetic, grain_potential
 } result_energy;
 
 // number of a row in a column, 0 where the scene has no such column
-static double result_cell(const char *row, int column) { return column < 0 ? 0 : silt_history_number(row, column); }
+static double result_cell(const char *row, int column) {
+    return column < 0 ? 0 : silt_history_number(row, column);
+}
 
 static bool walls_rest(const silt_scene *scene) {
     for (int i = 0; i < scene->n_wall; i++)
@@ -33,13 +36,14 @@ static bool walls_rest(const silt_scene *scene) {
     return true;
 }
 
-// Openings, a bed, bodies, forces, tension and closed air hold or bring energy that the history does not tell: no sum then. Of water and grains
-// together the sum is known where nothing is driven from outside, of water beside walls that move through the work done on it.
+// Openings, a bed, bodies, forces, tension and closed air hold or bring energy that the history does not tell: no sum
+// then. Of water and grains together the sum is known where nothing is driven from outside, of water beside walls that
+// move through the work done on it.
 static result_energy energy_known(const silt_scene *scene) {
     const silt_fluid_def *fluid = &scene->fluid;
     result_energy known = {0};
-    const bool closed = fluid->n_inlet == 0 && fluid->n_outlet == 0 && !scene->bed.on && fluid->force.kind == 0 && fluid->surface_tension == 0 &&
-                        fluid->air_pressure == 0 && scene->period[0] == scene->period[1];
+    const bool closed = fluid->n_inlet == 0 && fluid->n_outlet == 0 && !scene->bed.on && fluid->force.kind == 0 &&
+                        fluid->surface_tension == 0 && fluid->air_pressure == 0 && scene->period[0] == scene->period[1];
     if (!closed)
         return known;
     const bool alone = walls_rest(scene) && scene->n_body == 0;
@@ -53,7 +57,9 @@ static result_energy energy_known(const silt_scene *scene) {
     return known;
 }
 
-static bool energy_counts(const result_energy *known, int i) { return i < 3 ? known->water : i == 3 ? known->worked : known->grains; }
+static bool energy_counts(const result_energy *known, int i) {
+    return i < 3 ? known->water : i == 3 ? known->worked : known->grains;
+}
 
 static double energy_sum(const result_energy *known, const char *row) {
     double sum = 0;
@@ -99,7 +105,8 @@ static void row_finite(const bool *finite, int n, const char *header, const char
 }
 
 static void history_read(const silt_scene *scene, const char *out, result_history *h) {
-    static const char *const name[] = {"kinetic_energy", "potential_energy", "owed_energy", "external_work", "grain_kinetic_energy", "grain_potential_energy"};
+    static const char *const name[] = {"kinetic_energy", "potential_energy",     "owed_energy",
+                                       "external_work",  "grain_kinetic_energy", "grain_potential_energy"};
     char *path = silt_text("%s/history.csv", out), *line = NULL, *header = NULL;
     size_t capacity = 0, room = 0;
     int n = 0;
@@ -160,14 +167,16 @@ static double still_energy(const silt_scene *scene) {
     for (int i = 0; i < scene->fluid.n_region; i++) {
         double lo[3] = {0}, hi[3] = {0};
         silt_region_bounds(&scene->fluid.region[i], lo, hi);
-        energy += 0.5 * scene->fluid.density * g * silt_region_area(&scene->fluid.region[i]) * (hi[up < n ? up : 1] - lo[up < n ? up : 1]);
+        energy += 0.5 * scene->fluid.density * g * silt_region_area(&scene->fluid.region[i]) *
+                  (hi[up < n ? up : 1] - lo[up < n ? up : 1]);
     }
     return energy;
 }
 
 // a number of the last frame that is none; @return false: all are
 static bool frame_bad(const char *out, char text[64]) {
-    static const char *const part[] = {"fluid", "grains"}, *const array[] = {"PointData/velocity", "PointData/pressure"};
+    static const char *const part[] = {"fluid", "grains"}, *const array[] = {"PointData/velocity",
+                                                                             "PointData/pressure"};
     silt_frame_entry *entry = NULL;
     const int n = silt_frame_index(out, &entry);
     bool bad = false;
@@ -215,13 +224,16 @@ static double result_number(struct fy_document *summary, const char *key) {
 }
 
 // @return true: the run is wrong, and text says in what; whole: it went to its end
-static bool judge(const study *s, const silt_scene *scene, const char *out, struct fy_document *summary, bool whole, const char *warned,
-                  study_row *row, char *text, size_t size) {
+static bool judge(const study *s, const silt_scene *scene, const char *out, struct fy_document *summary, bool whole,
+                  const char *warned, study_row *row, char *text, size_t size) {
     result_history h;
     char where[64] = "";
     history_read(scene, out, &h);
-    const double volume = result_number(summary, "/worst_volume_error"), sediment = result_number(summary, "/worst_sediment_error");
-    const double scale = h.scale + (scene->fluid.on ? still_energy(scene) : 0), excess = scale > 0 ? h.excess / scale : h.excess > 0 ? HUGE_VAL : h.excess;
+    const double volume = result_number(summary, "/worst_volume_error"),
+                 sediment = result_number(summary, "/worst_sediment_error");
+    const double scale = h.scale + (scene->fluid.on ? still_energy(scene) : 0), excess = scale > 0 ? h.excess / scale
+                                                                                         : h.excess > 0 ? HUGE_VAL
+                                                                                                        : h.excess;
     study_row_add(row, "volume_error", "%.3g", volume);
     study_row_add(row, "mass_error", "%.3g", h.mass);
     study_row_add(row, "sediment_error", "%.3g", sediment);
@@ -239,7 +251,8 @@ static bool judge(const study *s, const silt_scene *scene, const char *out, stru
     else if (!(fabs(sediment) <= s->bounds.sediment))
         snprintf(text, size, "sediment error %.3g, allowed %g", sediment, s->bounds.sediment);
     else if (excess > s->bounds.energy && !*warned)
-        snprintf(text, size, "energy %.3g above the start and the work from outside, allowed %g", excess, s->bounds.energy);
+        snprintf(text, size, "energy %.3g above the start and the work from outside, allowed %g", excess,
+                 s->bounds.energy);
     else
         return false;
     return true;
@@ -247,7 +260,8 @@ static bool judge(const study *s, const silt_scene *scene, const char *out, stru
 
 static void result_numbers(struct fy_document *summary, study_row *row) {
     const double steps = silt_summary_number(summary, "/steps_here"), time = silt_summary_number(summary, "/time");
-    const double nodes = steps > 0 ? silt_summary_number(summary, "/node_steps") / steps : silt_summary_number(summary, "/nodes");
+    const double nodes =
+        steps > 0 ? silt_summary_number(summary, "/node_steps") / steps : silt_summary_number(summary, "/nodes");
     const double retries = silt_summary_number(summary, "/retries");
     study_row_add(row, "nodes", "%.6g", nodes);
     study_row_add(row, "grains", "%s", silt_summary_text(summary, "/grains"));
@@ -286,7 +300,8 @@ void study_result(const study *s, const char *out, const char *log, const study_
     free(told);
     if (end->late) {
         status = end->stalled ? RUN_HUNG : RUN_UNFINISHED;
-        snprintf(reason, sizeof reason, "stopped after %.3g s of the processor, %.3g s on the wall", end->cpu, end->wall);
+        snprintf(reason, sizeof reason, "stopped after %.3g s of the processor, %.3g s on the wall", end->cpu,
+                 end->wall);
     } else if (end->signal) {
         status = RUN_CRASHED;
         snprintf(why, sizeof why, "%.150s", reason);
@@ -309,7 +324,8 @@ void study_result(const study *s, const char *out, const char *log, const study_
             snprintf(reason, sizeof reason, "%s", warned);
         else if (whole)
             snprintf(reason, sizeof reason, cut > 0 ? "%.0f steps cut" : "", cut);
-        if (silt_scene_read(path, 0, NULL, &scene, &err) != SILT_OK || judge(s, scene, out, summary, whole, warned, &numbers, why, sizeof why)) {
+        if (silt_scene_read(path, 0, NULL, &scene, &err) != SILT_OK ||
+            judge(s, scene, out, summary, whole, warned, &numbers, why, sizeof why)) {
             status = RUN_WRONG;
             snprintf(reason, sizeof reason, "%s", scene ? why : "scene.yaml of the run cannot be read");
         }
