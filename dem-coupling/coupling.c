@@ -104,7 +104,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
     c->exchange.force.def = (silt_force_def){grains->added_mass, scene->fluid.theta, grains->viscous_force,
                                              grains->lift == LIFT_SAFFMAN, grains->rotational_drag};
     memcpy(c->exchange.gravity, scene->gravity, sizeof c->exchange.gravity);
-    c->exchange.layers = grains->kernel_layers;
+    c->exchange.layer_grain = !grains->kernel_layers ? 0.0 : squares > 0.0 ? cubes / squares : diameter;
     c->exchange.gusts = grains->gusts > 0.0;
     c->exchange.width = grains->kernel > 0.0 ? grains->kernel : silt_max(3.0 * diameter, 2.0 * scene->fluid.size);
 

@@ -768,7 +768,8 @@ static void test_failures(void **unused) {
         if (busy) {
             FAILS(silt_dem_wait(dem, &error), text);
         } else {
-            usleep(20000);
+            siginfo_t gone;
+            assert_int_equal(waitid(P_PID, (id_t)silt_dem_process(dem), &gone, WEXITED | WNOWAIT), 0);
             FAILS(silt_dem_start(dem, 1, NULL, NULL, NULL, &error), text);
         }
         FAILS(silt_dem_start(dem, 1, NULL, NULL, NULL, &error), text);
