@@ -214,6 +214,8 @@ static void test_statuses(void **state) {
     // of what the run itself told it was warned, and that alone
     ends(SUMMARY("2", "0.3"), sound, "!frame 1\nwarning: t = 1 s: the water's volume is off", good, RUN_WARNED,
          "warning: t = 1 s: the water's volume");
+    ends(SUMMARY("2", "0.3"), sound, "!warning: t = 0 s: the shear\nwarning: t = 1 s: the water's volume is off\n", good,
+         RUN_WARNED, "warning: t = 0 s: the shear");
     ends(SUMMARY("2", "0.3"), sound, "!warning: t = 1 s: the shear", good, RUN_WRONG, "volume error 0.3");
     ends(SUMMARY("0", "null"), sound, "", good, RUN_WRONG, "volume error nan");
     ends(NULL, sound, "warning: a\nscene.yaml:1:2: key 'a': found", (study_end){.code = SILT_INPUT}, RUN_REFUSED,

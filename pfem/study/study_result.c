@@ -199,8 +199,8 @@ static bool frame_bad(const char *out, char text[64]) {
 
 // ---------------------------------------------------------------- reasons
 
-// first line of the message of a run that ended with one, or its first warning
-static void log_reason(const char *log, bool warning, char *reason, size_t size) {
+// first line of the message of a run that ended with one
+static void log_reason(const char *log, char *reason, size_t size) {
     char *line = NULL;
     size_t capacity = 0;
     ssize_t length;
@@ -209,7 +209,7 @@ static void log_reason(const char *log, bool warning, char *reason, size_t size)
     while (from && (length = getline(&line, &capacity, from)) > 0) {
         line[strcspn(line, "\n")] = 0;
         const bool warns = strncmp(line, "warning", 7) == 0 || strstr(line, ": warning: ");
-        if (warns != warning || !*line)
+        if (warns || !*line)
             continue;
         snprintf(reason, size, "%s", line);
         break;
@@ -217,6 +217,23 @@ static void log_reason(const char *log, bool warning, char *reason, size_t size)
     if (from)
         fclose(from);
     free(line);
+}
+
+// what a run warned of while it went, a line each
+static void log_warnings(const char *out, char *text, size_t size) {
+    char *path = silt_text("%s/run.log", out), *line = NULL;
+    size_t capacity = 0, used = 0;
+    FILE *from = fopen(path, "r");
+    *text = 0;
+    while (from && getline(&line, &capacity, from) > 0 && used < size - 1)
+        if (strncmp(line, "warning", 7) == 0) {
+            snprintf(text + used, size - used, "%s", line);
+            used = strlen(text);
+        }
+    if (from)
+        fclose(from);
+    free(line);
+    free(path);
 }
 
 static double result_number(struct fy_document *summary, const char *key) {
@@ -244,9 +261,9 @@ static bool judge(const study *s, const silt_scene *scene, const char *out, stru
         snprintf(text, size, "no number in %s", where);
     else if (!whole)
         return false;
-    else if (!(h.mass <= s->bounds.mass) && !strstr(warned, "volume"))
+    else if (!(h.mass <= s->bounds.mass) && !strstr(warned, "water's volume is off"))
         snprintf(text, size, "mass error %.3g, allowed %g", h.mass, s->bounds.mass);
-    else if (!(fabs(volume) <= s->bounds.volume) && !strstr(warned, "volume"))
+    else if (!(fabs(volume) <= s->bounds.volume) && !strstr(warned, "water's volume is off"))
         snprintf(text, size, "volume error %.3g, allowed %g", volume, s->bounds.volume);
     else if (!(fabs(sediment) <= s->bounds.sediment))
         snprintf(text, size, "sediment error %.3g, allowed %g", sediment, s->bounds.sediment);
@@ -293,11 +310,10 @@ static void result_checks(struct fy_document *summary, study_row *row) {
 void study_result(const study *s, const char *out, const char *log, const study_end *end, study_row *row) {
     struct fy_document *summary = end->code >= 0 ? silt_summary_open(out) : NULL;
     study_status status = RUN_OK;
-    char reason[400] = "", why[200], warned[400], *told = silt_text("%s/run.log", out);
+    char reason[400] = "", why[200], warned[2000];
     study_row numbers = {0};
-    log_reason(log, false, reason, sizeof reason);
-    log_reason(told, true, warned, sizeof warned);
-    free(told);
+    log_reason(log, reason, sizeof reason);
+    log_warnings(out, warned, sizeof warned);
     if (end->late) {
         status = end->stalled ? RUN_HUNG : RUN_UNFINISHED;
         snprintf(reason, sizeof reason, "stopped after %.3g s of the processor, %.3g s on the wall", end->cpu,
@@ -321,7 +337,7 @@ void study_result(const study *s, const char *out, const char *log, const study_
         char *path = silt_text("%s/scene.yaml", out);
         status = !whole ? RUN_FAILED : *warned ? RUN_WARNED : cut > 0 ? RUN_CUT : RUN_OK;
         if (whole && *warned)
-            snprintf(reason, sizeof reason, "%s", warned);
+            snprintf(reason, sizeof reason, "%.*s", (int)strcspn(warned, "\n"), warned);
         else if (whole)
             snprintf(reason, sizeof reason, cut > 0 ? "%.0f steps cut" : "", cut);
         if (silt_scene_read(path, 0, NULL, &scene, &err) != SILT_OK ||
