@@ -334,5 +334,9 @@
     window.addEventListener('resize', resize);
     resize();
     fit();
-    show(data.frames.length - 1);
+    // the last frame, or the one at the time that the address tells: report.html#t=2.5
+    var asked = /^#t=([-+.\de]+)$/.exec(window.location.hash), first = data.frames.length - 1;
+    while (asked && first > 0 && Math.abs(data.frames[first - 1].t - asked[1]) < Math.abs(data.frames[first].t - asked[1]))
+        first--;
+    show(first);
 }());

@@ -68,6 +68,8 @@ silt_status silt_run_loads_sane(const silt_run *run, silt_error *err) {
 // step, s. again: the step was cut
 static void load_bodies(silt_run *run, double before, bool again) {
     silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    if (bodies->count == 0)
+        return;
     SILT_RESERVE(run->body_load, run->body_load_capacity, bodies->count + 1);
     for (int b = 0; b < bodies->count; b++)
         for (int d = 0; d < 6; d++) {
