@@ -12,7 +12,7 @@ trap 'rm -rf "$work"' EXIT
 mkdir -p "$folder"
 folder=$(CDPATH='' cd -- "$folder" && pwd -P)
 
-# small CASE INPUT...: pictures one below the other, 820 wide, of 128 colours
+# small CASE INPUT...: pictures one below the other, 820 wide, of 256 colours
 small() {
     to=$docs/$1
     shift
@@ -32,7 +32,7 @@ small() {
     done
     [ "$n" -eq 1 ] && stack=null || stack=vstack=$n
     # shellcheck disable=SC2086 # words
-    ffmpeg -loglevel error -y $inputs -filter_complex "$filter$stack,split[a][b];[a]palettegen=max_colors=128[p];[b][p]paletteuse=dither=none" \
+    ffmpeg -loglevel error -y $inputs -filter_complex "$filter$stack,split[a][b];[a]palettegen=max_colors=256[p];[b][p]paletteuse=dither=none" \
         -frames:v 1 "$to"
 }
 
