@@ -316,7 +316,10 @@
     if (space && data.frames.some(function (frame) { return frame.water; }))
         tickBox('see through the water', false, function (on) { glass = on; });
     element('button', parts, 'whole view').addEventListener('click', fit);
-    if (data.label) {
+    var coloured = data.frames.some(function (frame) {
+        return ['water', 'bed'].some(function (name) { return frame[name] && frame[name].c !== undefined; });
+    });
+    if (data.label && coloured) {
         var scale = element('span', parts);
         scale.className = 'scale';
         element('span', scale, data.low.toPrecision(3));
