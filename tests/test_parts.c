@@ -55,7 +55,8 @@ static bool has_coupling(const silt_run *run) {
     return run->coupling || run->drag || run->waiting || run->rest || run->fluid.share;
 }
 static bool has_bodies(const silt_run *run) {
-    return (run->barrier.bodies && run->barrier.bodies->count) || run->body_load || run->body_before;
+    return (run->barrier.bodies && run->barrier.bodies->count) || run->body_before || run->body_after || run->body_velocity || run->body_shift ||
+           run->gap_force || run->body_carry || run->uplift;
 }
 static bool has_fed(const silt_run *run) {
     return run->owed;
