@@ -4,7 +4,6 @@
 
 static const double parcel_least = 0.4, parcel_most = 2.0; // radii of parcels in contact, times that of grains.parcel
 static const double parcel_usual = 0.75;                   // radius that the time step is chosen for
-static const double clump_spacing = 0.3;                   // between a body's spheres, times their radius
 static const double room_overlap = 0.01;                   // of the radius
 static const double heap_porosity = 0.4;                   // of what fills the regions, when it has settled
 static const double period_share = 3.2;                    // slab thickness over the largest sphere's diameter
@@ -33,40 +32,6 @@ double silt_coupling_burden(const silt_coupling *c, const coupling_grain *g) {
         return 1.0;
     double sphere = 4.0 / 3.0 * M_PI * crumb * crumb * crumb * g->mass / g->solid;
     return silt_max(1.0, sphere / (g->mass * c->width));
-}
-
-// bodies' outlines and clumps, per metre of width
-static silt_status coupling_shapes(silt_coupling *c, silt_error *err) {
-    const silt_scene *scene = c->scene;
-    size_t n = (size_t)scene->n_body;
-    c->body = silt_alloc(n, sizeof *c->body);
-    c->body_force = silt_alloc(3 * n, sizeof(double));
-    c->body_torque = silt_alloc(3 * n, sizeof(double));
-    c->bodies = silt_alloc(1, sizeof *c->bodies);
-    c->bodies->body = silt_alloc(n, sizeof *c->bodies->body);
-    c->bodies->count = scene->n_body;
-    for (int i = 0; i < scene->n_body; i++) {
-        const silt_body_def *def = &scene->body[i];
-        coupling_body *body = &c->body[i];
-        struct silt_body *state = &c->bodies->body[i];
-        SILT_TRY(silt_outline_create(&body->shape, def, err));
-        silt_clump_create(&body->clump, &body->shape, 0.0, clump_spacing);
-        body->fixed = def->motion == MOTION_FIXED;
-        double place[4];
-        silt_coupling_place(c, i, 0.0, place);
-        for (int k = 0; k < 2; k++) {
-            state->x[k] = place[k];
-            state->v[k] = body->fixed ? 0.0 : def->velocity[k];
-        }
-        state->q[0] = cos(place[3] / 2.0);
-        state->q[3] = sin(place[3] / 2.0);
-        state->mass = def->density * body->shape.area;
-        state->inertia[2] = def->density * body->shape.inertia;
-        state->volume = body->shape.area;
-        state->n_point = body->shape.n_point;
-        state->point = body->shape.point;
-    }
-    return SILT_OK;
 }
 
 // widths, radii, time step and everything else that the worker is told once
@@ -300,17 +265,6 @@ static void coupling_deposit(silt_coupling *c, int grain) {
 
 // ---------------------------------------------------------------- room
 
-// distance from a point to a body; beyond `far` only a lower bound of it
-static double coupling_body_distance(const silt_coupling *c, int i, const double x[2], double far) {
-    const struct silt_body *b = &c->bodies->body[i];
-    double d[2] = {x[0] - b->x[0], x[1] - b->x[1]}, bound = hypot(d[0], d[1]) - c->body[i].shape.radius;
-    if (bound > far)
-        return bound;
-    double angle = 2.0 * atan2(b->q[3], b->q[0]);
-    double local[2] = {cos(angle) * d[0] + sin(angle) * d[1], cos(angle) * d[1] - sin(angle) * d[0]};
-    return silt_outline_distance(&c->body[i].shape, local);
-}
-
 static double coupling_wall_distance(const silt_walls *walls, int i, const double x[2]) {
     const double *a = walls->from[i], *b = walls->to[i], e[2] = {b[0] - a[0], b[1] - a[1]}, d[2] = {x[0] - a[0], x[1] - a[1]};
     const double t = silt_clamp((e[0] * d[0] + e[1] * d[1]) / (e[0] * e[0] + e[1] * e[1]), 0.0, 1.0);
@@ -329,7 +283,7 @@ static double coupling_gap(const void *context, const double *x) {
         if (!c->grain[i].gone)
             gap = silt_min(gap, coupling_apart(c, x, c->grain[i].x) - c->grain[i].radius);
     for (int i = 0; i < c->bodies->count; i++)
-        gap = silt_min(gap, coupling_body_distance(c, i, x, gap));
+        gap = silt_min(gap, silt_coupling_body_distance(c, i, x, gap));
     return gap;
 }
 
@@ -492,9 +446,7 @@ static void coupling_add(silt_coupling *c) {
         silt_dem_add(c->dem, n, c->add);
 }
 
-static void coupling_keep(silt_coupling *c) {
-    silt_dem_keep(c->dem);
-}
+static void coupling_keep(silt_coupling *c) { silt_dem_keep(c->dem); }
 
 static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     if (c->refused.count > 0)
@@ -502,6 +454,8 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
 
     // forces in the order of the last state, of spheres as they are in the slab
     coupling_compact(c);
+    if (n > 0 && c->responds)
+        silt_coupling_keep_old(c);
     SILT_RESERVE(c->force, c->force_capacity, 3 * c->n_last);
     memset(c->force, 0, 3 * (size_t)c->n_last * sizeof *c->force);
     for (int i = 0, k = 0; i < c->n_grain; i++) {
@@ -604,16 +558,7 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
     c->n_last = state->n_grain;
     if (state->n_grain > 0)
         memcpy(c->last, state->id, (size_t)state->n_grain * sizeof *c->last);
-    for (int i = 0; i < state->n_body && i < c->bodies->count; i++) {
-        struct silt_body *b = &c->bodies->body[i];
-        memcpy(b->x, state->body_x + 3 * i, sizeof b->x);
-        memcpy(b->v, state->body_v + 3 * i, sizeof b->v);
-        memcpy(b->w, state->body_omega + 3 * i, sizeof b->w);
-        memcpy(b->q, state->body_q + 4 * i, sizeof b->q);
-        for (int k = 0; k < 3 && c->elapsed > 0.0; k++)
-            b->contact[k] =
-                b->mass * ((b->v[k] - c->body[i].old_v[k]) / c->elapsed - c->scene->gravity[k]) - b->force[k];
-    }
+    silt_coupling_bodies_receive(c, state);
     return SILT_OK;
 }
 
@@ -627,38 +572,22 @@ static silt_status coupling_create(silt_coupling **coupling, const silt_coupling
     c->dim = def->scene->dimension == 3 ? 3 : 2;
     c->next_id = c->sent_id = 1;
     c->view = silt_alloc(1, sizeof *c->view);
-    SILT_TRY(coupling_shapes(c, err));
+    SILT_TRY(silt_coupling_bodies(c, err));
     coupling_measure(c, def);
-    return SILT_OK;
-}
-
-static silt_status coupling_send_bodies(silt_coupling *c, silt_error *err) {
-    for (int i = 0; i < c->bodies->count; i++) {
-        const struct silt_body *b = &c->bodies->body[i];
-        const silt_clump *clump = &c->body[i].clump;
-        silt_dem_body body = {.n_sphere = clump->n_sphere,
-                              .sphere = clump->sphere,
-                              .mass = b->mass * c->width,
-                              .inertia = b->inertia[2] * c->width,
-                              .angle = 2.0 * atan2(b->q[3], b->q[0]),
-                              .fixed = c->body[i].fixed};
-        memcpy(body.x, b->x, sizeof body.x);
-        memcpy(body.v, b->v, sizeof body.v);
-        memcpy(body.omega, b->w, sizeof body.omega);
-        SILT_TRY(silt_dem_add_body(c->dem, &body, err));
-    }
     return SILT_OK;
 }
 
 static silt_status coupling_open_dem(silt_coupling *c, silt_error *err) {
     SILT_TRY(silt_dem_open(&c->dem, &c->dem_def, err));
-    return coupling_send_bodies(c, err);
+    return silt_coupling_send_bodies(c, err);
 }
 
 static silt_status coupling_recover(silt_coupling *c, silt_error *err) {
     if (!silt_dem_own_fault(c->dem))
         return SILT_FAILED;
     silt_dem_close(&c->dem);
+    silt_coupling_take_old(c);
+    coupling_touched(c);
     c->dem_def.append = true;
     SILT_TRY(coupling_open_dem(c, err));
     // it is told of everything anew
@@ -715,18 +644,14 @@ static void coupling_close(silt_coupling **coupling) {
     free(c->wall);
     free(c->triangle);
     free(c->guide);
-    for (int i = 0; i < c->bodies->count; i++) {
-        silt_outline_clear(&c->body[i].shape);
-        silt_clump_clear(&c->body[i].clump);
-    }
-    free(c->bodies->body);
-    free(c->bodies);
+    silt_coupling_bodies_clear(c);
     coupling_view *w = c->view;
     void *owned[] = {w->contact, w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
                      c->body,     c->body_force, c->body_torque, c->force, c->add,    c->torque,
                      c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate,
-                     c->eddy,     c->shift,      c->walk};
+                     c->eddy,     c->shift,      c->walk,          c->response};
+    silt_coupling_forget_old(c);
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);
@@ -745,7 +670,12 @@ static silt_body_state *coupling_bodies(const silt_coupling *c) { return c->bodi
 static int coupling_process(const silt_coupling *c) { return silt_dem_process(c->dem); }
 
 static int coupling_outline(const silt_coupling *c, int body, double h, double *point, int capacity) {
-    return silt_outline_nodes(&c->body[body].shape, h, point, capacity);
+    const silt_solid *skin = &c->body[body].skin;
+    if (c->dim == 2)
+        return silt_outline_nodes(&c->body[body].shape, h, point, capacity);
+    if (point != NULL)
+        memcpy(point, skin->point, (size_t)(capacity < skin->n_point ? capacity : skin->n_point) * sizeof *skin->point);
+    return skin->n_point;
 }
 
 static void coupling_left(const silt_coupling *c, double *mass, double *solid, int64_t *count) {
@@ -785,10 +715,12 @@ const silt_coupling_type silt_coupling_dem = {
     .bodies = coupling_bodies,
     .prepare = coupling_prepare,
     .load = coupling_load,
+    .respond = silt_coupling_respond,
     .walk = silt_coupling_walk,
     .gusts = silt_coupling_gusts,
     .exchanged = coupling_exchanged,
     .outline = coupling_outline,
+    .describe = silt_coupling_describe,
     .room = coupling_room,
     .release = coupling_release,
     .deposit = coupling_deposit,

@@ -3,12 +3,14 @@
 #include "dem_check.h"
 #include "guide.h"
 #include "link.h"
+#include "pose.h"
 
 // a body as it was given, with what its pose is measured from
 typedef struct dem_solid {
     silt_dem_body def; // def.sphere owned
     int slot;          // among the free bodies in the worker, -1: fixed
-    double axis;       // direction of the worker's axis in it at the start, radians
+    double axis;       // slab: direction of the worker's axis in it at the start, radians
+    double frame[3][3]; // space: the worker's axes when it had its first orientation
 } dem_solid;
 
 struct silt_dem {
@@ -31,32 +33,26 @@ struct silt_dem {
     silt_dem_sphere *add; // owned
     int n_guide; // bytes of guide
     const void *guide; // borrowed, of the next run
-    const double *torque, *shift; // borrowed, of the next run, NULL: none
+    const double *torque, *shift, *response; // borrowed, of the next run, NULL: none
     double (*rate)[4]; // owned, velocity and spin of every motion
     int n_solid, cap_solid, n_free, n_free_sphere;
     dem_solid *solid; // owned
     // the last state, owned
     silt_dem_state state;
-    int cap_grain[7], cap_body[4];
+    int cap_grain[7], cap_body[6];
     int64_t *id;
     double *x, *v, *omega, *radius, *mass;
     int *contacts;
     int cap_bed;
     uint8_t *on_bed;
-    double *body_x, *body_v, *body_omega, *body_q;
+    double *body_x, *body_v, *body_omega, *body_q, *body_contact, *body_answer;
 };
 
-const silt_dem_state *silt_dem_state_now(const silt_dem *dem) {
-    return &dem->state;
-}
+const silt_dem_state *silt_dem_state_now(const silt_dem *dem) { return &dem->state; }
 
-int silt_dem_process(const silt_dem *dem) {
-    return dem->link.pid;
-}
+int silt_dem_process(const silt_dem *dem) { return dem->link.pid; }
 
-bool silt_dem_own_fault(const silt_dem *dem) {
-    return !dem->link.failed || dem->link.gave_up;
-}
+bool silt_dem_own_fault(const silt_dem *dem) { return !dem->link.failed || dem->link.gave_up; }
 
 // ---- opening and closing
 
@@ -69,7 +65,8 @@ void silt_dem_close(silt_dem **dem) {
         free((void *)d->solid[k].def.sphere);
     void *owned[] = {(void *)d->def.worker, (void *)d->def.log, (void *)d->def.wall, (void *)d->def.triangle, (void *)d->def.wall_motion,
                      (void *)d->def.motion, d->rate, d->live, d->remove, d->add, d->solid, d->id, d->x, d->v, d->omega,
-                     d->radius, d->mass, d->contacts, d->on_bed, d->body_x, d->body_v, d->body_omega, d->body_q};
+                     d->radius, d->mass, d->contacts, d->on_bed, d->body_x, d->body_v, d->body_omega, d->body_q,
+                     d->body_contact, d->body_answer};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
     free(d);
@@ -166,7 +163,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->no_contacts = def->no_contacts;
     s->n_body = bodies ? dem->n_free : 0;
     s->n_body_sphere = bodies ? dem->n_free_sphere : 0;
-    s->n_remove = s->n_add = s->n_force = s->n_torque = s->n_shift = s->n_guide = 0;
+    s->n_remove = s->n_add = s->n_force = s->n_torque = s->n_shift = s->n_guide = s->n_response = 0;
     s->max_grain = max_grain;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
@@ -184,10 +181,13 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
         b->mass = solid->def.mass;
         b->inertia = solid->def.inertia;
         b->angle = solid->def.angle;
+        memcpy(b->tensor, solid->def.tensor, sizeof b->tensor);
+        memcpy(b->q, solid->def.q, sizeof b->q);
         memcpy(b->x, solid->def.x, sizeof b->x);
         memcpy(b->v, solid->def.v, sizeof b->v);
         memcpy(b->omega, solid->def.omega, sizeof b->omega);
-        memcpy(&sphere[3 * first], solid->def.sphere, 3 * (size_t)b->n_sphere * sizeof(double));
+        const size_t width = (size_t)silt_clump_width(s->dim);
+        memcpy(&sphere[width * (size_t)first], solid->def.sphere, width * (size_t)b->n_sphere * sizeof(double));
         first += b->n_sphere;
     }
     SILT_TRY(dem_link_send(&dem->link, word, err));
@@ -243,10 +243,10 @@ static void dem_reserve(silt_dem *dem, int n_grain) {
     SILT_RESERVE(dem->mass, dem->cap_grain[5], n_grain + 1);
     SILT_RESERVE(dem->contacts, dem->cap_grain[6], n_grain + 1);
     SILT_RESERVE(dem->on_bed, dem->cap_bed, n_grain + 1);
-    SILT_RESERVE(dem->body_x, dem->cap_body[0], 3 * dem->n_solid + 1);
-    SILT_RESERVE(dem->body_v, dem->cap_body[1], 3 * dem->n_solid + 1);
-    SILT_RESERVE(dem->body_omega, dem->cap_body[2], 3 * dem->n_solid + 1);
-    SILT_RESERVE(dem->body_q, dem->cap_body[3], 4 * dem->n_solid + 1);
+    double **const body[] = {&dem->body_x, &dem->body_v, &dem->body_omega, &dem->body_q, &dem->body_contact, &dem->body_answer};
+    static const int per[] = {3, 3, 3, 4, 6, 6};
+    for (int k = 0; k < 6; k++)
+        SILT_RESERVE(*body[k], dem->cap_body[k], per[k] * dem->n_solid + 1);
     dem->state.id = dem->id;
     dem->state.x = dem->x;
     dem->state.v = dem->v;
@@ -259,47 +259,43 @@ static void dem_reserve(silt_dem *dem, int n_grain) {
     dem->state.body_v = dem->body_v;
     dem->state.body_omega = dem->body_omega;
     dem->state.body_q = dem->body_q;
+    dem->state.body_contact = dem->body_contact;
+    dem->state.body_answer = dem->body_answer;
 }
 
 // pose of solid k into the state
-static void dem_pose(silt_dem *dem, int k, const double *x, const double *v, const double *omega, double angle) {
+static void dem_pose(silt_dem *dem, int k, const double *x, const double *v, const double *omega, const double q[4]) {
     memcpy(&dem->body_x[3 * k], x, 3 * sizeof(double));
     memcpy(&dem->body_v[3 * k], v, 3 * sizeof(double));
     memcpy(&dem->body_omega[3 * k], omega, 3 * sizeof(double));
-    double q[4] = {cos(angle / 2), 0, 0, sin(angle / 2)};
-    memcpy(&dem->body_q[4 * k], q, sizeof q);
+    memcpy(&dem->body_q[4 * k], q, 4 * sizeof(double));
+}
+
+// orientation and angular velocity that the worker's answer stands for
+static void dem_turned(const silt_dem *dem, int k, const dem_body *b, double omega[3], double q[4]) {
+    const dem_solid *solid = &dem->solid[k];
+    if (dem->def.dim == 3) {
+        double axis[3][3];
+        memcpy(axis, b->axis, sizeof axis);
+        silt_pose_carried((const double(*)[3])solid->frame, (const double(*)[3])axis, solid->def.q, &dem->body_q[4 * k], q);
+        silt_pose_spin(solid->def.tensor, q, b->omega, omega);
+        return;
+    }
+    const double angle = solid->def.angle + atan2(b->axis[0][1], b->axis[0][0]) - solid->axis;
+    memcpy(q, (double[4]){cos(angle / 2), 0, 0, sin(angle / 2)}, 4 * sizeof *q);
+    memcpy(omega, b->omega, 3 * sizeof *omega);
 }
 
 silt_status silt_dem_add_body(silt_dem *dem, const silt_dem_body *body, silt_error *err) {
-    const double number[] = {body->mass, body->inertia, body->x[0],     body->x[1],
-                             body->v[0], body->v[1],    body->omega[2], body->angle};
     if (dem->begun)
-        return silt_fail(err, SILT_FAILED, "rigid body %d was added after the first run; bodies come before it",
-                         dem->n_solid);
-    if (body->n_sphere < 1 || !silt_dem_finite(8, number) || !silt_dem_finite(3 * body->n_sphere, body->sphere) ||
-        (!body->fixed && (body->mass <= 0 || body->inertia <= 0)))
-        return silt_fail(err, SILT_FAILED,
-                         "rigid body %d: %d spheres, mass %g kg, inertia %g kg m2; at least one sphere and positive "
-                         "finite numbers are needed",
-                         dem->n_solid, body->n_sphere, body->mass, body->inertia);
-    for (int i = 0; i < body->n_sphere; i++) {
-        const double *p = &body->sphere[3 * i];
-        double c = cos(body->angle), s = sin(body->angle);
-        double x[2] = {body->x[0] + c * p[0] - s * p[1], body->x[1] + s * p[0] + c * p[1]};
-        if (!(p[2] > 0) || p[2] > dem->def.max_radius * (1 + 1e-12))
-            return silt_fail(err, SILT_FAILED,
-                             "rigid body %d: sphere %d has radius %g m; it must be above 0 and at most %g m",
-                             dem->n_solid, i, p[2], dem->def.max_radius);
-        if (x[0] < dem->def.lo[0] || x[0] >= dem->def.hi[0] || x[1] < dem->def.lo[1] || x[1] >= dem->def.hi[1])
-            return silt_fail(
-                err, SILT_FAILED, "rigid body %d: sphere %d at (%g, %g) lies outside the box (%g, %g) to (%g, %g)",
-                dem->n_solid, i, x[0], x[1], dem->def.lo[0], dem->def.lo[1], dem->def.hi[0], dem->def.hi[1]);
-    }
+        return silt_fail(err, SILT_FAILED, "rigid body %d was added after the first run; bodies come before it", dem->n_solid);
+    SILT_TRY(silt_dem_check_body(&dem->def, dem->n_solid, body, err));
     SILT_RESERVE(dem->solid, dem->cap_solid, dem->n_solid + 1);
     dem_solid *solid = &dem->solid[dem->n_solid++];
     *solid = (dem_solid){.def = *body, .slot = body->fixed ? -1 : dem->n_free++};
-    double *sphere = silt_alloc(3 * (size_t)body->n_sphere, sizeof *sphere);
-    memcpy(sphere, body->sphere, 3 * (size_t)body->n_sphere * sizeof *sphere);
+    const size_t width = (size_t)silt_clump_width(dem->def.dim);
+    double *sphere = silt_alloc(width * (size_t)body->n_sphere, sizeof *sphere);
+    memcpy(sphere, body->sphere, width * (size_t)body->n_sphere * sizeof *sphere);
     solid->def.sphere = sphere;
     if (!body->fixed)
         dem->n_free_sphere += body->n_sphere;
@@ -307,8 +303,9 @@ silt_status silt_dem_add_body(silt_dem *dem, const silt_dem_body *body, silt_err
     dem_reserve(dem, dem->state.n_grain);
     dem->state.n_body = dem->n_solid;
     static const double still[3] = {0, 0, 0};
+    const double plane[4] = {cos(body->angle / 2), 0, 0, sin(body->angle / 2)};
     dem_pose(dem, dem->n_solid - 1, body->x, body->fixed ? still : body->v, body->fixed ? still : body->omega,
-             body->angle);
+             dem->def.dim == 3 ? body->q : plane);
     return SILT_OK;
 }
 
@@ -319,8 +316,10 @@ static void dem_measure_axes(silt_dem *dem) {
     const dem_body *body = DEM_SECTION(dem->link.shared, const dem_body, body);
     for (int k = 0; k < dem->n_solid; k++) {
         dem_solid *solid = &dem->solid[k];
-        if (solid->slot >= 0)
-            solid->axis = atan2(body[solid->slot].axis[1], body[solid->slot].axis[0]);
+        if (solid->slot < 0)
+            continue;
+        solid->axis = atan2(body[solid->slot].axis[0][1], body[solid->slot].axis[0][0]);
+        memcpy(solid->frame, body[solid->slot].axis, sizeof solid->frame);
     }
 }
 
@@ -367,13 +366,17 @@ static silt_status dem_take(silt_dem *dem, silt_error *err) {
         const dem_body *b = &body[solid->slot];
         const double *last = &dem->body_x[3 * k];
         if (!b->present || !silt_dem_finite(3, b->x) || !silt_dem_finite(3, b->v) || !silt_dem_finite(3, b->omega) ||
-            !silt_dem_finite(3, b->axis)) {
-            return dem_link_give_up(&dem->link, err, "rigid body %d %s; it was last at (%g, %g)", k,
+            !silt_dem_finite(3, b->axis[0])) {
+            return dem_link_give_up(&dem->link, err, "rigid body %d %s; it was last at %s", k,
                                     b->present ? "is not finite after the run"
                                                : "has left the box of the discrete elements",
-                                    last[0], last[1]);
+                                    silt_dem_place(&dem->def, last).text);
         }
-        dem_pose(dem, k, b->x, b->v, b->omega, solid->def.angle + atan2(b->axis[1], b->axis[0]) - solid->axis);
+        memcpy(dem->body_contact + 6 * k, b->contact, sizeof b->contact);
+        memcpy(dem->body_answer + 6 * k, b->answer, sizeof b->answer);
+        double omega[3], q[4];
+        dem_turned(dem, k, b, omega, q);
+        dem_pose(dem, k, b->x, b->v, omega, q);
     }
     return SILT_OK;
 }
@@ -420,19 +423,6 @@ static silt_status dem_check_add(const silt_dem *dem, silt_error *err) {
     return SILT_OK;
 }
 
-static silt_status dem_check_load(const silt_dem *dem, const double *force, const double *body_force,
-                                  const double *body_torque, silt_error *err) {
-    for (int k = 0; force && k < dem->state.n_grain; k++)
-        if (!silt_dem_finite(3, &force[3 * k]))
-            return silt_fail(err, SILT_FAILED, "the force on grain %lld at %s is not finite: %s", (long long)dem->id[k],
-                             silt_dem_place(&dem->def, &dem->x[3 * k]).text, silt_dem_place(&dem->def, &force[3 * k]).text);
-    for (int k = 0; k < dem->n_solid; k++)
-        if ((body_force && !silt_dem_finite(3, &body_force[3 * k])) || (body_torque && !silt_dem_finite(3, &body_torque[3 * k])))
-            return silt_fail(err, SILT_FAILED, "the force or torque on rigid body %d at (%g, %g) is not finite", k,
-                             dem->body_x[3 * k], dem->body_x[3 * k + 1]);
-    return SILT_OK;
-}
-
 static int dem_find(const silt_dem *dem, int64_t id) {
     int lo = 0, hi = dem->n_live;
     while (lo < hi) {
@@ -472,14 +462,10 @@ static void dem_write_edits(silt_dem *dem, bool fixed_bodies) {
     n = 0;
     for (int k = 0; fixed_bodies && k < dem->n_solid; k++) {
         const silt_dem_body *b = &dem->solid[k].def;
-        double c = cos(b->angle), t = sin(b->angle);
         for (int i = 0; b->fixed && i < b->n_sphere; i++) {
-            const double *p = &b->sphere[3 * i];
-            add[n++] = (dem_add){.tag = dem->next_tag++,
-                                 .type = DEM_TYPE_FIXED_BODY,
-                                 .x = {b->x[0] + c * p[0] - t * p[1], b->x[1] + t * p[0] + c * p[1], 0},
-                                 .radius = p[2],
-                                 .density = 1000};
+            add[n] = (dem_add){.tag = dem->next_tag++, .type = DEM_TYPE_FIXED_BODY, .density = 1000};
+            add[n].radius = silt_dem_sphere_at(&dem->def, b, i, add[n].x);
+            n++;
         }
     }
     SILT_RESERVE(dem->live, dem->cap_live, dem->n_live + dem->n_add + 1);
@@ -511,7 +497,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         return silt_fail(err, SILT_FAILED, "discrete elements: %s",
                          n_step < 0 ? "a negative number of substeps" : "a run is under way");
     SILT_TRY(dem_check_add(dem, err));
-    SILT_TRY(dem_check_load(dem, force, body_force, body_torque, err));
+    SILT_TRY(silt_dem_check_load(&dem->def, &dem->state, force, body_force, body_torque, err));
     bool first = !dem->begun;
     SILT_TRY(dem_begin(dem, err));
 
@@ -529,6 +515,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     s->n_force = force ? dem->state.n_grain : 0;
     s->n_torque = dem->torque ? dem->state.n_grain : 0;
     s->n_shift = dem->shift ? dem->state.n_grain : 0;
+    s->n_response = dem->response ? 36 * dem->n_free * dem->n_free : 0;
     s->n_guide = dem->n_guide;
     s->max_grain = n_grain + dem->n_add;
     SILT_TRY(dem_link_reserve(&dem->link, err));
@@ -543,9 +530,11 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         memcpy(DEM_SECTION(s, double, torque), dem->torque, 3 * (size_t)s->n_torque * sizeof(double));
     if (dem->shift)
         memcpy(DEM_SECTION(s, double, shift), dem->shift, 3 * (size_t)s->n_shift * sizeof(double));
+    if (dem->response)
+        memcpy(DEM_SECTION(s, double, response), dem->response, (size_t)s->n_response * sizeof(double));
     if (dem->n_guide)
         memcpy(DEM_SECTION(s, char, guide), dem->guide, (size_t)dem->n_guide);
-    dem->torque = dem->shift = NULL;
+    dem->torque = dem->shift = dem->response = NULL;
     dem->n_guide = 0;
     for (int k = 0; k < dem->n_solid; k++) {
         if (dem->solid[k].slot < 0)
@@ -561,6 +550,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
 
 void silt_dem_twist(silt_dem *dem, const double *torque) { dem->torque = torque; }
 void silt_dem_shift(silt_dem *dem, const double *shift) { dem->shift = shift; }
+void silt_dem_respond(silt_dem *dem, const double *matrix) { dem->response = matrix; }
 
 void silt_dem_keep(silt_dem *dem) { dem->keep = true; }
 
@@ -586,12 +576,13 @@ silt_status silt_dem_wait(silt_dem *dem, silt_error *err) {
 // ---- checkpoint
 
 enum { SAVED_BEGUN, SAVED_LIVE, SAVED_REMOVE, SAVED_ADD, SAVED_SOLID, SAVED_SPHERE, SAVED_TAG, SAVED_LENGTH };
-enum { ADD_LENGTH = 11, SOLID_LENGTH = 15 };
+enum { ADD_LENGTH = 11, SOLID_LENGTH = 34 };
 
 // the bodies: what they are, and the axis that their angle is measured from
 static silt_status dem_save_solids(const silt_dem *dem, silt_store *store, int n_sphere, silt_error *err) {
     double *number = silt_alloc((size_t)SOLID_LENGTH * (size_t)dem->n_solid + 1, sizeof *number);
-    double *sphere = silt_alloc(3 * (size_t)n_sphere + 1, sizeof *sphere);
+    const size_t width = (size_t)silt_clump_width(dem->def.dim);
+    double *sphere = silt_alloc(width * (size_t)n_sphere + 1, sizeof *sphere);
     int first = 0;
 
     for (int k = 0; k < dem->n_solid; k++) {
@@ -599,14 +590,17 @@ static silt_status dem_save_solids(const silt_dem *dem, silt_store *store, int n
         double row[SOLID_LENGTH] = {b->n_sphere, b->fixed,    b->mass,     b->inertia, b->x[0],
                                     b->x[1],     b->x[2],     b->v[0],     b->v[1],    b->v[2],
                                     b->omega[0], b->omega[1], b->omega[2], b->angle,   dem->solid[k].axis};
+        memcpy(row + 15, b->tensor, sizeof b->tensor);
+        memcpy(row + 21, b->q, sizeof b->q);
+        memcpy(row + 25, dem->solid[k].frame, sizeof dem->solid[k].frame);
         memcpy(&number[SOLID_LENGTH * k], row, sizeof row);
-        memcpy(&sphere[3 * first], b->sphere, 3 * (size_t)b->n_sphere * sizeof *sphere);
+        memcpy(&sphere[width * (size_t)first], b->sphere, width * (size_t)b->n_sphere * sizeof *sphere);
         first += b->n_sphere;
     }
     silt_status status =
         silt_store_put(store, "dem/body", STORE_DOUBLE, (size_t)SOLID_LENGTH * (size_t)dem->n_solid, number, err);
     if (status == SILT_OK)
-        status = silt_store_put(store, "dem/body_sphere", STORE_DOUBLE, 3 * (size_t)n_sphere, sphere, err);
+        status = silt_store_put(store, "dem/body_sphere", STORE_DOUBLE, width * (size_t)n_sphere, sphere, err);
     free(number);
     free(sphere);
     return status;
@@ -614,13 +608,14 @@ static silt_status dem_save_solids(const silt_dem *dem, silt_store *store, int n
 
 static silt_status dem_load_solids(silt_dem *dem, silt_store *store, int n_solid, int n_sphere, silt_error *err) {
     double *number = silt_alloc((size_t)SOLID_LENGTH * (size_t)n_solid + 1, sizeof *number);
-    double *sphere = silt_alloc(3 * (size_t)n_sphere + 1, sizeof *sphere);
+    const size_t width = (size_t)silt_clump_width(dem->def.dim);
+    double *sphere = silt_alloc(width * (size_t)n_sphere + 1, sizeof *sphere);
     int first = 0;
 
     silt_status status =
         silt_store_take(store, "dem/body", STORE_DOUBLE, (size_t)SOLID_LENGTH * (size_t)n_solid, number, err);
     if (status == SILT_OK)
-        status = silt_store_take(store, "dem/body_sphere", STORE_DOUBLE, 3 * (size_t)n_sphere, sphere, err);
+        status = silt_store_take(store, "dem/body_sphere", STORE_DOUBLE, width * (size_t)n_sphere, sphere, err);
     for (int k = 0; status == SILT_OK && k < n_solid; k++) {
         const double *row = &number[SOLID_LENGTH * k];
         silt_dem_body body = {
@@ -633,11 +628,15 @@ static silt_status dem_load_solids(silt_dem *dem, silt_store *store, int n_solid
         memcpy(body.x, &row[4], sizeof body.x);
         memcpy(body.v, &row[7], sizeof body.v);
         memcpy(body.omega, &row[10], sizeof body.omega);
-        body.sphere = &sphere[3 * first];
+        memcpy(body.tensor, &row[15], sizeof body.tensor);
+        memcpy(body.q, &row[21], sizeof body.q);
+        body.sphere = &sphere[width * (size_t)first];
         first += body.n_sphere;
         status = silt_dem_add_body(dem, &body, err);
-        if (status == SILT_OK)
-            dem->solid[k].axis = row[14];
+        if (status != SILT_OK)
+            break;
+        dem->solid[k].axis = row[14];
+        memcpy(dem->solid[k].frame, &row[25], sizeof dem->solid[k].frame);
     }
     free(number);
     free(sphere);

@@ -42,9 +42,11 @@ typedef struct dem_grain {
 typedef struct dem_body {
     int n_sphere, first; // its spheres in the sphere section, rows first .. first + n_sphere - 1; tag of row k is k + 1
     double mass, inertia, angle;
-    double x[3], v[3], omega[3];
-    double axis[3]; // direction of a line fixed in the body
+    double tensor[6], q[4];    // space: xx, yy, zz, xy, xz, yz of the inertia in its frame; how it is turned at the start
+    double x[3], v[3], omega[3]; // omega of an answer in space: angular momentum
+    double axis[3][3]; // directions of lines fixed in the body, in the plane the first
     double force[3], torque[3];
+    double contact[6], answer[6]; // mean force and torque of contacts, and what the water answered (response.h); with n_response only
     int present, pad; // 0: it left the box
 } dem_body;
 
@@ -63,7 +65,7 @@ typedef struct dem_shared {
     double step, max_radius, min_radius;
     int resume, no_contacts;
     // lengths of the sections
-    int n_wall, n_triangle, n_motion, n_body, n_body_sphere, n_remove, n_add, n_force, n_torque, n_shift, n_guide, max_grain;
+    int n_wall, n_triangle, n_motion, n_body, n_body_sphere, n_remove, n_add, n_force, n_torque, n_shift, n_guide, n_response, max_grain;
     int n_step;
     int keep; // 1: this run may go on from the last one's end
     // answer
@@ -77,12 +79,13 @@ typedef struct dem_shared {
     uint64_t wall_motion; // int per wall and triangle: which motion it has, -1: none
     uint64_t motion;      // dem_motion
     uint64_t body;        // dem_body
-    uint64_t body_sphere; // 3 double: x, y from the centroid, radius
+    uint64_t body_sphere; // 3 double: x, y from the centroid, radius; in space 4: x, y, z, radius
     uint64_t remove;      // int: tags
     uint64_t add;         // dem_add
     uint64_t force;       // 3 double per grain of the last answer, in its order
     uint64_t torque;      // 3 double per grain, alike
     uint64_t shift;       // 3 double per grain, alike
+    uint64_t response;    // 6 n_body rows of as many double, see response.h
     uint64_t guide;       // n_guide bytes, see guide.h
     uint64_t grain;       // dem_grain, rising tags (answer)
 } dem_shared;
@@ -99,12 +102,13 @@ static inline uint64_t dem_shared_layout(dem_shared *s) {
     DEM_PLACE(wall_motion, s->n_wall + s->n_triangle, int);
     DEM_PLACE(motion, s->n_motion, dem_motion);
     DEM_PLACE(body, s->n_body, dem_body);
-    DEM_PLACE(body_sphere, 3 * s->n_body_sphere, double);
+    DEM_PLACE(body_sphere, (s->dim == 3 ? 4 : 3) * s->n_body_sphere, double);
     DEM_PLACE(remove, s->n_remove, int);
     DEM_PLACE(add, s->n_add, dem_add);
     DEM_PLACE(force, 3 * s->n_force, double);
     DEM_PLACE(torque, 3 * s->n_torque, double);
     DEM_PLACE(shift, 3 * s->n_shift, double);
+    DEM_PLACE(response, s->n_response, double);
     DEM_PLACE(guide, s->n_guide, char);
     DEM_PLACE(grain, s->max_grain, dem_grain);
 #undef DEM_PLACE

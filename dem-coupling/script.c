@@ -526,6 +526,8 @@ void script_open(void *lmp, const dem_shared *s, const char *restart, int *plane
         script_say(lmp, "fix grav all gravity %.17g vector %.17g %.17g %.17g", g, s->gravity[0] / g, s->gravity[1] / g,
                    s->dim == 3 ? s->gravity[2] / g : 0);
     script_walls(lmp, s, plane);
+    // sees the forces of contacts; the water's come after it
+    script_say(lmp, "fix imp all external pf/callback 1 1000000000");
     // the force on a sphere or, through one of its spheres, on a body; has to stand before the bodies
     script_say(lmp, "fix cfd all couple/cfd couple_every 0 mpi");
     script_say(lmp, "fix cff all couple/cfd/force");
@@ -548,19 +550,20 @@ void script_integrate(void *lmp, const dem_shared *s, const char *path, int fd) 
         FILE *file = script_file(fd);
         double volume = 0;
         for (int i = b->first; i < b->first + b->n_sphere; i++) {
-            const double *p = &sphere[3 * i];
-            fprintf(file, "%.17g %.17g 0 %.17g\n", p[0], p[1], p[2]);
-            volume += 4.0 / 3.0 * M_PI * p[2] * p[2] * p[2];
+            const double *p = &sphere[(s->dim == 3 ? 4 : 3) * i], radius = p[s->dim == 3 ? 3 : 2];
+            fprintf(file, "%.17g %.17g %.17g %.17g\n", p[0], p[1], s->dim == 3 ? p[2] : 0, radius);
+            volume += 4.0 / 3.0 * M_PI * radius * radius * radius;
         }
         script_file_close(file);
-        // mass and inertia as given, no motion out of the plane; use_density keeps the given origin as the centroid
+        // mass and inertia as given, in the slab no motion out of the plane; use_density keeps the given origin as the centroid
+        const double plane[6] = {b->inertia, b->inertia, b->inertia, 0, 0, 0}, *t = s->dim == 3 ? b->tensor : plane;
         script_say(
             lmp,
-            "fix pt%d all particletemplate/multisphere %d atom_type %d density constant %.17g nspheres %d ntry 100000 "
-            "spheres file %s scale 1.0 type %d mass %.17g inertia_tensor %.17g 0 0 %.17g 0 %.17g use_density "
-            "fflag on on off tflag off off on",
-            k, script_prime(3 * k), DEM_TYPE_BODY, b->mass / volume, b->n_sphere, path, k + 1, b->mass, b->inertia,
-            b->inertia, b->inertia);
+            "fix pt%d all particletemplate/multisphere %d atom_type %d density constant %.17g nspheres %d ntry %d "
+            "spheres file %s scale 1.0 type %d mass %.17g inertia_tensor %.17g %.17g %.17g %.17g %.17g %.17g use_density "
+            "fflag on on %s tflag %s on",
+            k, script_prime(3 * k), DEM_TYPE_BODY, b->mass / volume, b->n_sphere, s->dim == 3 ? 10000 : 100000, path, k + 1, b->mass,
+            t[0], t[3], t[4], t[1], t[5], t[2], s->dim == 3 ? "on" : "off", s->dim == 3 ? "on on" : "off off");
         script_say(lmp, "fix pd%d all particledistribution/discrete %d 1 pt%d 1.0", k, script_prime(3 * k + 1), k);
     }
     if (s->n_body)
@@ -573,16 +576,19 @@ void script_integrate(void *lmp, const dem_shared *s, const char *path, int fd) 
 
 void script_insert(void *lmp, const dem_shared *s, int k) {
     const dem_body *b = &DEM_SECTION(s, const dem_body, body)[k];
+    const double plane[4] = {cos(b->angle / 2), 0, 0, sin(b->angle / 2)}, *q = s->dim == 3 ? b->q : plane;
+    const double on = s->dim == 3 ? 1 : 0; // third coordinates count
     // a place within rounding; far out that is more
-    const double far = fmax(fabs(b->x[0]), fabs(b->x[1]));
-    script_say(lmp, "region rg sphere %.17g %.17g 0 %.17g volume_limit 1e-60 units box", b->x[0], b->x[1], far < 8 ? 1e-15 : 1e-15 * far);
+    const double far = fmax(fmax(fabs(b->x[0]), fabs(b->x[1])), on * fabs(b->x[2]));
+    script_say(lmp, "region rg sphere %.17g %.17g %.17g %.17g volume_limit 1e-60 units box", b->x[0], b->x[1], on * b->x[2],
+               far < 8 ? 1e-15 : 1e-15 * far);
     script_say(
         lmp,
         "fix in all insert/pack seed %d distributiontemplate pd%d maxattempt 5 verbose no insert_every once "
         "overlapcheck no "
-        "all_in no vel constant %.17g %.17g 0 omega constant 0 0 %.17g orientation constant %.17g 0 0 %.17g region rg "
+        "all_in no vel constant %.17g %.17g %.17g omega constant %.17g %.17g %.17g orientation constant %.17g %.17g %.17g %.17g region rg "
         "ntry_mc 1001 particles_in_region 1",
-        script_prime(3 * k + 2), k, b->v[0], b->v[1], b->omega[2], cos(b->angle / 2), sin(b->angle / 2));
+        script_prime(3 * k + 2), k, b->v[0], b->v[1], on * b->v[2], on * b->omega[0], on * b->omega[1], b->omega[2], q[0], q[1], q[2], q[3]);
     // a step so short that nothing moves
     script_say(lmp, "timestep 1e-30");
     script_say(lmp, "run 1 pre yes post no");

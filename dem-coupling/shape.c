@@ -72,10 +72,35 @@ silt_status silt_outline_create(silt_outline *shape, const silt_body_def *body, 
         shape->n_point = disc_points;
         shape->point = silt_alloc(2 * (size_t)disc_points, sizeof(double));
         for (int i = 0; i < disc_points; i++) {
-            shape->point[2 * i] = w / 2.0 * cos(2.0 * M_PI * i / disc_points);
-            shape->point[2 * i + 1] = w / 2.0 * sin(2.0 * M_PI * i / disc_points);
+            // a polygon of the circle's area
+            const double r = w / 2.0 * sqrt(2.0 * M_PI / disc_points / sin(2.0 * M_PI / disc_points));
+            shape->point[2 * i] = r * cos(2.0 * M_PI * i / disc_points);
+            shape->point[2 * i + 1] = r * sin(2.0 * M_PI * i / disc_points);
         }
         break;
+    case SHAPE_WEDGE: {
+        double h = body->height > 0.0 ? body->height : w;
+        const double wedge[6] = {0.0, 0.0, w / 2, h, -w / 2, h};
+        shape->n_point = 3;
+        shape->point = silt_alloc(6, sizeof(double));
+        memcpy(shape->point, wedge, sizeof wedge);
+        break;
+    }
+    case SHAPE_CAPSULE: {
+        double r = (body->height > 0.0 ? body->height : w / 2) / 2;
+        if (!(2 * r < w))
+            return silt_fail(err, SILT_INPUT, "body %s: height: found %g m, allowed less than its scale of %g m: a capsule is longer than thick",
+                             name, 2 * r, w);
+        shape->n_point = disc_points + 2;
+        shape->point = silt_alloc(2 * (size_t)shape->n_point, sizeof(double));
+        for (int i = 0; i < shape->n_point; i++) {
+            const int half = i > disc_points / 2;
+            const double angle = 2.0 * M_PI * (i - half) / disc_points - M_PI / 2;
+            shape->point[2 * i] = (half ? -1 : 1) * (w / 2 - r) + r * cos(angle);
+            shape->point[2 * i + 1] = r * sin(angle);
+        }
+        break;
+    }
     case SHAPE_TEMPLE:
         shape->n_point = (int)(sizeof temple_point / sizeof *temple_point);
         shape->point = silt_alloc(2 * (size_t)shape->n_point, sizeof(double));
@@ -103,8 +128,8 @@ silt_status silt_outline_create(silt_outline *shape, const silt_body_def *body, 
         break;
     }
     default:
-        return silt_fail(err, SILT_INPUT, "body %s: shape: found %d, allowed: box, disc, polygon, temple", name,
-                         (int)body->shape);
+        return silt_fail(err, SILT_INPUT, "body %s: shape: found one that is of space only, allowed in 2-D: box, disc, polygon, temple, capsule, wedge",
+                         name);
     }
 
     // counter-clockwise, about the centroid
@@ -215,6 +240,16 @@ int silt_outline_nodes(const silt_outline *shape, double h, double *point, int c
             if (point != NULL && n < capacity)
                 memcpy(point + 2 * n, x, sizeof x);
         }
+    }
+    // what is round all the way stands a little outside of the outline, so that the area is the same
+    bool round = n_run == 1 && point != NULL && n <= capacity;
+    for (int i = 0; i < shape->n_point && round; i++)
+        round = !shape_corner(shape, i);
+    if (round) {
+        double area, centroid[2], moment;
+        shape_integrate(n, point, &area, centroid, &moment);
+        for (int i = 0; i < 2 * n; i++)
+            point[i] *= sqrt(shape->area / area);
     }
     free(run);
     return n;

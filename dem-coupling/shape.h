@@ -15,15 +15,16 @@ typedef struct silt_outline {
     double radius;  // m, of the circle about the centroid that holds the outline
 } silt_outline;
 
-/** spheres along the inside of the outline, tangent to it */
+/** spheres along the inside of the outline or surface, tangent to it */
 typedef struct silt_clump {
     int n_sphere, capacity;
-    double *sphere;           // owned, 3 per sphere: x, y, radius
+    double *sphere;           // owned, 3 per sphere: x, y, radius; of a surface (form.h) 4: x, y, z, radius
     double largest, smallest; // m, radii
     double error;             // m, see silt_clump_error
 } silt_clump;
 
-/** Makes the outline of a body of the scene: box, disc (a polygon of 128 points), polygon or temple, `scale` wide.
+/** Makes the outline of a body of the scene: box, disc (a polygon of 128 points), capsule, wedge, polygon
+ * or temple, `scale` wide.
  * Errors (SILT_INPUT): a polygon with fewer than 3 points, without area, or that crosses itself. */
 silt_status silt_outline_create(silt_outline *shape, const silt_body_def *body, silt_error *err);
 void silt_outline_clear(silt_outline *shape);

@@ -2,6 +2,7 @@
  * file open; it does one instruction after the other until it is told to end or its parent is gone. */
 #define _GNU_SOURCE
 #include "motion.h"
+#include "response.h"
 #include "script.h"
 #include "touch.h"
 
@@ -248,21 +249,23 @@ static int worker_compare(const void *a, const void *b) {
 
 static void worker_answer_bodies(void) {
     dem_body *body = DEM_SECTION(worker.shared, dem_body, body);
-    static const char *const name[] = {"xcm", "vcm", "angmom", "ex_space"};
-    for (int k = 0; worker.n_body && k < 4; k++) {
+    static const char *const name[] = {"xcm", "vcm", "angmom", "ex_space", "ey_space", "ez_space"};
+    const bool space = worker.shared->dim == 3;
+    for (int k = 0; worker.n_body && k < (space ? 6 : 4); k++) {
         double **row = worker_body_read(name[k]);
         for (int b = 0; b < worker.n_body; b++) {
-            double *to = k == 0 ? body[b].x : k == 1 ? body[b].v : k == 2 ? body[b].omega : body[b].axis;
+            double *to = k == 0 ? body[b].x : k == 1 ? body[b].v : k == 2 ? body[b].omega : body[b].axis[k - 3];
             memcpy(to, row[b], 3 * sizeof(double));
         }
     }
-    // angular momentum came; the inertia is the same about all axes
+    // angular momentum came; in the slab the inertia is the same about all axes
     for (int b = 0; b < worker.n_body; b++) {
-        for (int c = 0; c < 3; c++)
+        for (int c = 0; c < 3 && !space; c++)
             body[b].omega[c] /= body[b].inertia;
         // LIGGGHTS drops a body when its centroid has left, and its spheres one by one: no axis came then
-        const double *axis = body[b].axis;
-        body[b].present = worker_find(worker.body_first[b] + 1) >= 0 && axis[0] * axis[0] + axis[1] * axis[1] > 0;
+        const double *axis = body[b].axis[0];
+        body[b].present =
+            worker_find(worker.body_first[b] + 1) >= 0 && axis[0] * axis[0] + axis[1] * axis[1] + (space ? axis[2] * axis[2] : 0) > 0;
     }
 }
 
@@ -332,6 +335,42 @@ static void worker_share(const dem_body *body, const double *sphere, double *wei
     }
 }
 
+// the same in space
+static void worker_share_space(const dem_body *body, const double *sphere, double *weight) {
+    const int n = body->n_sphere;
+    double m[3][4] = {{0}}, r[3], left = n, trace = 0;
+    for (int i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++) {
+            m[c][3] += sphere[4 * i + c];
+            for (int k = 0; k < 3; k++)
+                m[c][k] += sphere[4 * i + c] * sphere[4 * i + k];
+        }
+    double sum[3] = {m[0][3], m[1][3], m[2][3]};
+    for (int c = 0; c < 3; c++)
+        trace += m[c][c];
+    for (int c = 0; c < 3; c++)
+        m[c][c] += 1e-12 * trace + 1e-300;
+    // positive definite: no pivots
+    for (int c = 0; c < 3; c++)
+        for (int k = c + 1; k < 3; k++) {
+            const double factor = m[k][c] / m[c][c];
+            for (int e = c; e < 4; e++)
+                m[k][e] -= factor * m[c][e];
+        }
+    for (int c = 2; c >= 0; c--) {
+        r[c] = m[c][3];
+        for (int k = c + 1; k < 3; k++)
+            r[c] -= m[c][k] * r[k];
+        r[c] /= m[c][c];
+    }
+    for (int c = 0; c < 3; c++)
+        left -= sum[c] * r[c];
+    for (int i = 0; i < n; i++) {
+        const double *d = &sphere[4 * i];
+        weight[i] = left > 1e-6 ? (1 - r[0] * d[0] - r[1] * d[1] - r[2] * d[2]) / left : i == 0;
+    }
+}
+
 static void worker_body_table(void) {
     const dem_body *body = DEM_SECTION(worker.shared, const dem_body, body);
     const double *sphere = DEM_SECTION(worker.shared, const double, body_sphere);
@@ -343,7 +382,10 @@ static void worker_body_table(void) {
     for (int b = 0; b < worker.n_body; b++) {
         worker.body_first[b] = body[b].first;
         worker.body_row[b] = &worker.body_state[3 * b];
-        worker_share(&body[b], &sphere[3 * body[b].first], &worker.weight[body[b].first]);
+        if (worker.shared->dim == 3)
+            worker_share_space(&body[b], &sphere[4 * body[b].first], &worker.weight[body[b].first]);
+        else
+            worker_share(&body[b], &sphere[3 * body[b].first], &worker.weight[body[b].first]);
     }
 }
 
@@ -357,6 +399,8 @@ static void worker_open(void) {
         worker_fail("LIGGGHTS does not start");
     worker.plane = worker_grow(worker.plane, (size_t)(s->n_wall + s->n_triangle), sizeof *worker.plane);
     script_open(worker.lmp, s, worker_path(DEM_FD_RESTART), worker.plane);
+    if (!response_open(worker.lmp))
+        worker_fail("LIGGGHTS has no fix external");
     if (s->resume) {
         worker_body_table();
         script_integrate(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
@@ -383,8 +427,8 @@ static void worker_bodies(void) {
         script_insert(worker.lmp, s, b);
         int there = lg_max_body(worker.lmp), spheres = lammps_get_natoms(worker.lmp);
         if (there != b + 1 || spheres != body[b].first + body[b].n_sphere)
-            worker_fail("body %d could not be placed at (%g, %g): LIGGGHTS has %d bodies and %d spheres", b,
-                        body[b].x[0], body[b].x[1], there, spheres);
+            worker_fail("body %d could not be placed at (%g, %g, %g): LIGGGHTS has %d bodies and %d spheres", b,
+                        body[b].x[0], body[b].x[1], body[b].x[2], there, spheres);
     }
     worker_answer();
 }
@@ -428,18 +472,21 @@ static void worker_load(void) {
     // bodies stand where the last answer said
     for (int b = 0; b < worker.n_body; b++) {
         const double *F = body[b].force;
-        double moment = 0;
+        double moment[3] = {0, 0, 0};
         for (int k = body[b].first; k < body[b].first + body[b].n_sphere; k++) {
             int i = worker_find(k + 1);
             if (i < 0)
                 break;
-            f[i][0] = worker.weight[k] * F[0];
-            f[i][1] = worker.weight[k] * F[1];
-            moment += (a.x[i][0] - body[b].x[0]) * f[i][1] - (a.x[i][1] - body[b].x[1]) * f[i][0];
+            for (int c = 0; c < s->dim; c++)
+                f[i][c] = worker.weight[k] * F[c];
+            for (int c = s->dim == 3 ? 0 : 2; c < 3; c++) {
+                const int p = (c + 1) % 3, q = (c + 2) % 3;
+                moment[c] += (a.x[i][p] - body[b].x[p]) * f[i][q] - (a.x[i][q] - body[b].x[q]) * f[i][p];
+            }
         }
         int i = worker_find(worker.body_first[b] + 1);
-        if (i >= 0)
-            t[i][2] = body[b].torque[2] - moment;
+        for (int c = s->dim == 3 ? 0 : 2; c < 3 && i >= 0; c++)
+            t[i][c] = body[b].torque[c] - moment[c];
     }
 }
 
@@ -530,12 +577,15 @@ static void worker_run(void) {
         worker_load();
         worker_walls(0);
         motion_begin(worker_guide(), s);
+        if (!response_begin(worker.lmp, s))
+            worker_fail("out of memory");
     }
     // the multisphere bodies' sums of forces cannot be reached: they are set up for every run (ten thousand grains: 5 ms)
     if (!worker.settled && (s->n_step > 0 || s->n_remove || s->n_add))
         worker_set_up();
     if (s->n_step > 0)
         worker_advance(s->n_step);
+    response_end();
     motion_end();
     worker_answer();
 }

@@ -92,6 +92,16 @@ static inline void silt_sum(double *sum, double *rest, double x) {
     *sum = t + *rest;
     *rest -= *sum - t;
 }
+/** x turned by the quaternion q = (w, x, y, z), which may be of any length but zero; back: the other way */
+static inline void silt_turn(const double q[4], bool back, const double x[3], double out[3]) {
+    const double w = back ? -q[0] : q[0], square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], two = 2 / square;
+    const double c[3] = {q[2] * x[2] - q[3] * x[1], q[3] * x[0] - q[1] * x[2], q[1] * x[1] - q[2] * x[0]};
+    const double turned[3] = {x[0] + two * (w * c[0] + q[2] * c[2] - q[3] * c[1]), x[1] + two * (w * c[1] + q[3] * c[0] - q[1] * c[2]),
+                              x[2] + two * (w * c[2] + q[1] * c[1] - q[2] * c[0])};
+    out[0] = turned[0];
+    out[1] = turned[1];
+    out[2] = turned[2];
+}
 static inline double silt_length(int dim, const double *a) { return sqrt(silt_dot(dim, a, a)); }
 
 #endif

@@ -390,11 +390,14 @@ typedef struct silt_body_state {
         double mass;                   // kg
         double inertia[6];             // kg m2 about the centroid in the body's frame: xx, yy, zz, xy, xz, yz; in 2-D zz alone counts
         double volume;                 // m3; 2-D: m2
+        int n_sphere;                  // of the clump that makes its contacts
+        double clump_error;            // m, how far they leave the surface
         int n_point;
         const double *point;           // of the surface, dim each, in the body's frame about the centroid, borrowed; in 2-D in order,
                                        // counter-clockwise
         int n_face;
         const int (*face)[3];          // 3-D: triangles of points, counter-clockwise from outside, borrowed
+        const struct silt_solid *solid; // 3-D: the same surface to search in (solid.h), borrowed
     } *body; // owned by the coupling
 } silt_body_state;
 
@@ -435,6 +438,7 @@ typedef struct silt_ledger {
     double volume_refined; // nodes added and removed, cumulative
     double volume_given;   // debts paid, cumulative
     double volume_owed;    // debts of wet nodes that are still to be paid
+    double owed_energy;    // J, kinetic and potential, that these debts have with their nodes
     double y_plus;         // distance of the wall law's sample in wall units, mean by length or area of its facets; NaN: none
     double angular_momentum[3]; // kg m/s times m, of the water about the origin; in 2-D the last only
     // the larger of two, of the last step's solve: force on the water that its inertia does not answer, relative to weight and

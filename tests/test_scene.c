@@ -661,7 +661,7 @@ static void test_help(void **state) {
     assert_int_equal(silt_scene_help("bodies.0.height", to, &err), SILT_OK);
     assert_int_equal(silt_scene_help("walls", to, &err), SILT_OK);
     fclose(to);
-    assert_non_null(strstr(text, "of a box; 0: as wide as high; only with shape: box"));
+    assert_non_null(strstr(text, "of a box or wedge, length of a cylinder, thickness of a capsule; 0: as the scale"));
     assert_non_null(strstr(text, "the last point is joined to the first; only with polyline or box; 2-D only\n"));
     free(text);
     to = open_memstream(&text, &size);

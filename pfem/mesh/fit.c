@@ -1,17 +1,18 @@
-// keeps the water's mesh on the bed: edges (in space faces) of the bed that the triangulation has lost
+// keeps the water's mesh on the bed and, in space, on bodies: edges (in space faces) of theirs that the triangulation has lost
 
 #include "remesh.h"
+#include "solid.h"
 
-// A node close over a face of the bed is joined by the triangulation to nodes on the bed's other side, right through it. Such cells are
+// A node close over a face of the bed or a body is joined by the triangulation to nodes on its other side, right through it. Such cells are
 // no water, and a hollow without pressure would stay on the face. It is filled by cells between faces and node.
 #define FIT_FLAT 0.002 // times h: flatter cells are left out
 
-/** a free facet with two nodes on the bed, from -> to as it lists them, and its third node */
+/** a free facet with two nodes on the bed or on one body, from -> to as it lists them, and its third node */
 typedef struct fit_rim {
     int from, to, apex;
 } fit_rim;
 
-/** a side of a face of the bed that is no facet of the water */
+/** a side of a face of the bed or a body that is no facet of the water */
 typedef struct fit_side {
     int from, to, face;
 } fit_side;
@@ -22,7 +23,7 @@ typedef struct fit {
     int n_rim, rim_capacity, n_side, side_capacity, n_face, face_capacity;
     fit_rim *rim;   // owned, sorted
     fit_side *side; // owned, sorted
-    int (*face)[4]; // owned, the bed's faces that are missing, in the water's numbers, counter-clockwise seen from it; fourth -1
+    int (*face)[4]; // owned, the faces that are missing, in the water's numbers, counter-clockwise seen from it; fourth -1
     int *stack, *state; // owned, one per face: of the fill at work (state 1), filled (2)
 } fit;
 
@@ -48,43 +49,161 @@ static int first_from(int n, const void *record, int from, int to) {
     return lo;
 }
 
-// free facets at the bed, and which of the bed's faces are facets of the water
-static void fit_collect(fit *f, const silt_bed *bed) {
+// which solid a node is of: a body, -1 the bed, -2 none
+static int fit_owner(const silt_nodes *nodes, int i) {
+    return nodes->kind[i] == NODE_BODY ? nodes->owner[i] : nodes->kind[i] == NODE_BED ? -1 : -2;
+}
+
+// a face that no facet of the water is
+static void fit_missing(fit *f, const silt_cell_set *set, const int face[4]) {
+    if (face[0] < 0 || face[1] < 0 || face[2] < 0 || silt_cell_set_find(set, face) >= 0)
+        return;
+    SILT_RESERVE(f->face, f->face_capacity, f->n_face + 1);
+    memcpy(f->face[f->n_face], face, sizeof *f->face);
+    SILT_RESERVE(f->side, f->side_capacity, f->n_side + 3);
+    for (int a = 0; a < 3; a++)
+        f->side[f->n_side++] = (fit_side){face[a], face[(a + 1) % 3], f->n_face};
+    f->n_face++;
+}
+
+// The water's node of every point of the bodies' surfaces, one body after the other: they were the first nodes, in this order, and
+// keep their ids. @return owned by the caller
+static int *fit_body_nodes(const silt_nodes *nodes, const silt_body_state *bodies) {
+    int n = 0;
+    for (int b = 0; b < bodies->count; b++)
+        n += bodies->body[b].n_point;
+    int *node = silt_alloc((size_t)n + 1, sizeof *node);
+    for (int k = 0; k < n; k++)
+        node[k] = -1;
+    for (int i = 0; i < nodes->count; i++)
+        if (nodes->kind[i] == NODE_BODY && nodes->id[i] < n)
+            node[nodes->id[i]] = i;
+    return node;
+}
+
+static void fit_bodies(fit *f, const silt_cell_set *set, const silt_body_state *bodies) {
+    int *node = fit_body_nodes(f->nodes, bodies), first = 0;
+    for (int b = 0; b < bodies->count; b++) {
+        const struct silt_body *body = &bodies->body[b];
+        for (int k = 0; k < body->n_face; k++) {
+            const int *point = body->face[k], face[4] = {node[first + point[0]], node[first + point[1]], node[first + point[2]], -1};
+            fit_missing(f, set, face);
+        }
+        first += body->n_point;
+    }
+    free(node);
+}
+
+// the cell behind one of the listed facets, and its node that is not on it; -1: there is no such facet
+static int facet_cell(const silt_mesh *mesh, const silt_cell_set *set, const int *behind, int a, int b, int c, int *apex) {
+    const int key[4] = {a, b, c, -1}, k = silt_cell_set_find(set, key);
+    if (k < 0)
+        return -1;
+    for (int n = 0; n < 4; n++) {
+        const int i = mesh->cell[behind[k]][n];
+        *apex = i == a || i == b || i == c ? *apex : i;
+    }
+    return behind[k];
+}
+
+// An edge A D between the faces A D C and D A B of a body that stands out, with a node W close over it: the triangulation has the cells
+// A B C W and B D C W, which go through the body, in place of A D C W and D A B W.
+static void fit_ridges(silt_draft *draft, const silt_nodes *nodes, const silt_body_state *bodies, double size) {
+    silt_mesh *mesh = draft->mesh;
+    int(*facet)[4] = NULL, *behind = NULL, n = 0, capacity = 0, behind_capacity = 0, exchanged = 0, first = 0;
+    for (int e = 0; e < mesh->n_cell; e++)
+        for (int a = 0; a < 4; a++) {
+            int own[4] = {-1, -1, -1, -1};
+            if (mesh->across[e][a] >= 0)
+                continue;
+            silt_cell_facet(3, mesh->cell[e], a, own);
+            const int of = fit_owner(nodes, own[0]);
+            if (of < 0 || fit_owner(nodes, own[1]) != of || fit_owner(nodes, own[2]) != of)
+                continue;
+            SILT_RESERVE(facet, capacity, n + 1);
+            SILT_RESERVE(behind, behind_capacity, n + 1);
+            memcpy(facet[n], own, sizeof own);
+            behind[n++] = e;
+        }
+    silt_cell_set set;
+    silt_cell_set_create(&set, nodes->count, n, (const int(*)[4])facet);
+    int *node = fit_body_nodes(nodes, bodies);
+    for (int b = 0; b < bodies->count; first += bodies->body[b++].n_point) {
+        const silt_solid *solid = bodies->body[b].solid;
+        for (int f = 0; solid && f < solid->n_face; f++)
+            for (int k = 0; k < 3; k++) {
+                const int g = solid->beside[f][k], *at = solid->face[f], *other = solid->face[g];
+                const int m = other[0] != at[k] && other[0] != at[(k + 1) % 3] ? 0 : other[1] != at[k] && other[1] != at[(k + 1) % 3] ? 1 : 2;
+                const int A = node[first + at[k]], D = node[first + at[(k + 1) % 3]], C = node[first + at[(k + 2) % 3]], B = node[first + other[m]];
+                int apex[4] = {-1, -1, -1, -1};
+                if (g < f || A < 0 || B < 0 || C < 0 || D < 0 || facet_cell(mesh, &set, behind, A, D, C, &apex[2]) >= 0 ||
+                    facet_cell(mesh, &set, behind, D, A, B, &apex[3]) >= 0)
+                    continue;
+                const int e = facet_cell(mesh, &set, behind, A, B, C, &apex[0]), o = facet_cell(mesh, &set, behind, B, D, C, &apex[1]);
+                if (e < 0 || o < 0 || e == o || apex[0] != apex[1])
+                    continue;
+                const int fresh[2][4] = {{A, D, C, apex[0]}, {D, A, B, apex[0]}}, old[2] = {e, o};
+                const double h = silt_node_h(nodes, apex[0], size);
+                silt_cell_shape shape[2];
+                double corner[12];
+                bool sound = true;
+                for (int c = 0; c < 2; c++) {
+                    silt_cell_corners(mesh, nodes->x, fresh[c], corner);
+                    shape[c] = silt_cell_measure(3, corner);
+                    sound &= shape[c].volume > 0 && shape[c].height > FIT_FLAT * h;
+                }
+                for (int c = 0; c < 2 && sound; c++) {
+                    memcpy(mesh->cell[old[c]], fresh[c], sizeof fresh[c]);
+                    draft->before[old[c]] = -2;
+                    draft->quality[old[c]] = shape[c].height / h;
+                    exchanged++;
+                }
+            }
+    }
+    silt_cell_set_clear(&set);
+    free(facet);
+    free(behind);
+    free(node);
+    if (exchanged)
+        silt_cells_across(3, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
+
+}
+
+// free facets at the bed and bodies, and which of their faces are facets of the water
+static void fit_collect(fit *f, const silt_barrier *barrier) {
     const silt_mesh *mesh = f->draft->mesh;
     int(*facet)[4] = NULL, n = 0, capacity = 0;
     for (int e = 0; e < mesh->n_cell; e++)
         for (int a = 0; a < 4; a++) {
             if (mesh->across[e][a] >= 0)
                 continue;
-            int own[4] = {-1, -1, -1, -1}, n_bed = 0, other = 0;
+            int own[4] = {-1, -1, -1, -1}, of[3], other = -1;
             silt_cell_facet(3, mesh->cell[e], a, own);
-            for (int k = 0; k < 3; k++) {
-                n_bed += f->nodes->kind[own[k]] == NODE_BED;
-                other = f->nodes->kind[own[k]] == NODE_BED ? other : k;
-            }
-            if (n_bed == 3) {
+            for (int k = 0; k < 3; k++)
+                of[k] = fit_owner(f->nodes, own[k]);
+            // the one that is not of the others' solid
+            for (int k = 0; k < 3; k++)
+                if (of[(k + 1) % 3] == of[(k + 2) % 3] && of[(k + 1) % 3] != -2 && of[k] != of[(k + 1) % 3])
+                    other = k;
+            if (of[0] == of[1] && of[1] == of[2] && of[0] != -2) {
                 SILT_RESERVE(facet, capacity, n + 1);
                 memcpy(facet[n++], own, sizeof own);
-            } else if (n_bed == 2 && silt_facet_kind_of(mesh, f->nodes, own) == FACET_FREE) {
+            } else if (other >= 0 && silt_facet_kind_of(mesh, f->nodes, own) == FACET_FREE) {
                 SILT_RESERVE(f->rim, f->rim_capacity, f->n_rim + 1);
                 f->rim[f->n_rim++] = (fit_rim){own[(other + 1) % 3], own[(other + 2) % 3], own[other]};
             }
         }
     silt_cell_set set;
     silt_cell_set_create(&set, f->nodes->count, n, (const int(*)[4])facet);
-    for (int k = 0; k < bed->n_edge && f->n_rim; k++) {
+    const silt_bed *bed = barrier->bed;
+    for (int k = 0; bed && k < bed->n_edge && f->n_rim; k++) {
         int face[4] = {-1, -1, -1, -1};
         for (int a = 0; a < 3; a++)
             face[a] = bed->fluid_node[bed->edge[k][a]];
-        if (face[0] < 0 || face[1] < 0 || face[2] < 0 || silt_cell_set_find(&set, face) >= 0)
-            continue;
-        SILT_RESERVE(f->face, f->face_capacity, f->n_face + 1);
-        memcpy(f->face[f->n_face], face, sizeof face);
-        SILT_RESERVE(f->side, f->side_capacity, f->n_side + 3);
-        for (int a = 0; a < 3; a++)
-            f->side[f->n_side++] = (fit_side){face[a], face[(a + 1) % 3], f->n_face};
-        f->n_face++;
+        fit_missing(f, &set, face);
     }
+    if (barrier->bodies && f->n_rim)
+        fit_bodies(f, &set, barrier->bodies);
     silt_cell_set_clear(&set);
     free(facet);
     if (f->n_face) {
@@ -194,15 +313,21 @@ static void fit_edges(silt_draft *draft, const silt_nodes *nodes, const silt_bed
     free(side);
 }
 
-int silt_mesh_fit_bed(silt_draft *draft, const silt_nodes *nodes, const silt_bed *bed, double size) {
+int silt_mesh_fit(silt_draft *draft, const silt_nodes *nodes, const silt_barrier *barrier, double size) {
+    const bool bed = barrier->bed && barrier->bed->n_cell;
     if (draft->mesh->dim != 3) {
         const int first = draft->mesh->n_cell;
-        fit_edges(draft, nodes, bed, size);
+        if (bed)
+            fit_edges(draft, nodes, barrier->bed, size);
         return draft->mesh->n_cell - first;
     }
+    if (!bed && !(barrier->bodies && barrier->bodies->count))
+        return 0;
+    if (barrier->bodies && barrier->bodies->count)
+        fit_ridges(draft, nodes, barrier->bodies, size);
     fit f = {.draft = draft, .nodes = nodes};
     const int before = draft->mesh->n_cell;
-    fit_collect(&f, bed);
+    fit_collect(&f, barrier);
     f.stack = silt_alloc((size_t)f.n_face + 1, sizeof *f.stack);
     f.state = silt_alloc((size_t)f.n_face + 1, sizeof *f.state);
     for (int k = 0; k < f.n_face; k++)

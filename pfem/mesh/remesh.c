@@ -3,6 +3,7 @@
 #include "delaunay.h"
 #include "parallel.h"
 #include "remesh.h"
+#include "solid.h"
 
 static const double cloud_parts = 17592186044416.0; // 2^44, of a period
 #define WEDGE_LONG 3.5 // times h: longest edge of a cell in a wedge on a wall
@@ -24,6 +25,15 @@ bool silt_barrier_contains(const silt_barrier *barrier, const double *point) {
         return true;
     for (int b = 0; barrier->bodies && b < barrier->bodies->count; b++) {
         const struct silt_body *body = &barrier->bodies->body[b];
+        if (body->solid) {
+            double local[3] = {point[0] - body->x[0], point[1] - body->x[1], point[2] - body->x[2]};
+            if (silt_dot(3, local, local) > silt_square(body->solid->radius))
+                continue;
+            silt_turn(body->q, true, local, local);
+            if (silt_solid_contains(body->solid, local))
+                return true;
+            continue;
+        }
         // into the body's frame: turned back about z
         const double c = 1 - 2 * body->q[3] * body->q[3], s = 2 * body->q[0] * body->q[3];
         const double dx = point[0] - body->x[0], dy = point[1] - body->x[1];
@@ -93,6 +103,11 @@ bool silt_cell_on_wall(const silt_mesh *mesh, const silt_nodes *nodes, const int
     if (shape->height >= CELL_FLAT * h)
         return false;
     if (silt_mesh_share(mesh, nodes, mesh->dim + 1, cell))
+        return true;
+    int n_body = 0; // in space also all on one body
+    for (int a = 0; a < 4 && mesh->dim == 3; a++)
+        n_body += nodes->kind[cell[a]] == NODE_BODY && nodes->owner[cell[a]] == nodes->owner[cell[0]];
+    if (n_body == 4)
         return true;
     // in space also between nodes of an opening or of the bed, and of the wall around it
     bool opening = false, free_facet = false;
@@ -506,12 +521,12 @@ static void peel_slivers(silt_draft *draft, const silt_nodes *nodes, const uint8
 }
 
 // the chosen cells' neighbours; in 3-D slivers are taken off the surface and mended inside. @return flat cells left
-static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, uint8_t **sliver, const silt_bed *bed, double size) {
+static int draft_finish(silt_draft *draft, const silt_nodes *nodes, double *x, uint8_t **sliver, const silt_barrier *barrier, double size) {
     silt_mesh *mesh = draft->mesh;
     SILT_RESERVE(mesh->across, mesh->across_capacity, mesh->n_cell + 1);
     silt_cells_across(mesh->dim, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
     int flat;
-    const int before = mesh->n_cell, more = bed && bed->n_cell ? silt_mesh_fit_bed(draft, nodes, bed, size) : 0;
+    const int before = mesh->n_cell, more = silt_mesh_fit(draft, nodes, barrier, size);
     if (more) {
         int capacity = before;
         SILT_RESERVE(*sliver, capacity, mesh->n_cell);
@@ -562,7 +577,7 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
         silt_draft_push(&draft, cell, -1, shape.height / h);
     }
     free(cells);
-    draft_finish(&draft, nodes, NULL, &sliver, barrier->bed, scene->fluid.size);
+    draft_finish(&draft, nodes, NULL, &sliver, barrier, scene->fluid.size);
     free(sliver);
     draft_clear(&draft);
     silt_mesh_connect_known(mesh, nodes);
@@ -757,7 +772,7 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
         if (period <= 0 || 2 * largest <= margin || margin >= period)
             break;
     }
-    memory->flat = draft_finish(&draft, nodes, nodes->x, &sliver, barrier->bed, scene->fluid.size);
+    memory->flat = draft_finish(&draft, nodes, nodes->x, &sliver, barrier, scene->fluid.size);
 
     uint8_t *was_wet = silt_alloc((size_t)nodes->count + 1, 1);
     for (int e = 0; e < memory->n_cell; e++)

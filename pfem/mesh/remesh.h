@@ -87,9 +87,9 @@ typedef struct silt_draft {
 } silt_draft;
 
 void silt_draft_push(silt_draft *draft, const int cell[4], int before, double quality);
-/** In space: fills the hollows of the draft on faces of the bed that the triangulation has lost. Needs mesh->across, which it leaves
- * as it was, and the bed's fluid_node. @return how many cells came, at the end */
-int silt_mesh_fit_bed(silt_draft *draft, const silt_nodes *nodes, const silt_bed *bed, double size);
+/** Fills the hollows of the draft on edges of the bed, in space on faces of bed and bodies, that the triangulation has lost. Needs
+ * mesh->across, which it leaves as it was, and the bed's fluid_node. @return how many cells came, at the end */
+int silt_mesh_fit(silt_draft *draft, const silt_nodes *nodes, const silt_barrier *barrier, double size);
 /** Mends slivers of tetrahedra by removing edges and facets inside the water, the worst first; the water's volume and
  * its boundary stay. Where that does not help an inner node gives way by a few hundredths of h. Needs mesh->across and
  * keeps it.

@@ -343,32 +343,54 @@ static silt_status frame_bodies(const char *out, int number, const silt_view *vi
     size_t n = (size_t)bodies->count, points = 0;
     for (size_t i = 0; i < n; i++)
         points += (size_t)bodies->body[i].n_point;
-    double *x = silt_alloc(3 * points + 1, sizeof *x), *v = silt_alloc(3 * n + 1, sizeof *v);
-    int64_t *link = silt_alloc(points + 1, sizeof *link), *offset = silt_alloc(n + 1, sizeof *offset);
-    int64_t *id = silt_alloc(n + 1, sizeof *id);
-    uint8_t *type = silt_alloc(n + 1, 1);
+    // a cell per outline, in space one per face
+    size_t n_cell = 0, n_link = 0;
+    for (size_t i = 0; i < n; i++) {
+        n_cell += bodies->body[i].n_face ? (size_t)bodies->body[i].n_face : 1;
+        n_link += bodies->body[i].n_face ? 3 * (size_t)bodies->body[i].n_face : (size_t)bodies->body[i].n_point;
+    }
+    double *x = silt_alloc(3 * points + 1, sizeof *x), *v = silt_alloc(3 * n_cell + 1, sizeof *v);
+    int64_t *link = silt_alloc(n_link + 1, sizeof *link), *offset = silt_alloc(n_cell + 1, sizeof *offset);
+    int64_t *id = silt_alloc(n_cell + 1, sizeof *id);
+    uint8_t *type = silt_alloc(n_cell + 1, 1);
 
     // outlines turned by the quaternion about z: cos = 1 - 2 qz^2, sin = 2 qw qz
-    int64_t used = 0;
+    int64_t used = 0, linked = 0;
+    size_t cell = 0;
     for (size_t i = 0; i < n; i++) {
         const struct silt_body *b = &bodies->body[i];
         double c = 1 - 2 * b->q[3] * b->q[3], s = 2 * b->q[0] * b->q[3];
+        for (int k = 0; k < b->n_face; k++, cell++) {
+            for (int a = 0; a < 3; a++)
+                link[linked++] = used + b->face[k][a];
+            memcpy(v + 3 * cell, b->v, sizeof b->v);
+            offset[cell + 1] = linked;
+            type[cell] = VTK_TRIANGLE;
+            id[cell] = (int64_t)i;
+        }
+        for (int k = 0; k < b->n_point && b->n_face; k++, used++) {
+            silt_turn(b->q, false, b->point + 3 * k, x + 3 * used);
+            for (int d = 0; d < 3; d++)
+                x[3 * used + d] += b->x[d];
+        }
+        if (b->n_face)
+            continue;
         for (int k = 0; k < b->n_point; k++, used++) {
             x[3 * used] = b->x[0] + c * b->point[2 * k] - s * b->point[2 * k + 1];
             x[3 * used + 1] = b->x[1] + s * b->point[2 * k] + c * b->point[2 * k + 1];
-            link[used] = used;
+            link[linked++] = used;
         }
-        memcpy(v + 3 * i, b->v, sizeof b->v);
-        offset[i + 1] = used;
-        type[i] = VTK_POLYGON;
-        id[i] = (int64_t)i;
+        memcpy(v + 3 * cell, b->v, sizeof b->v);
+        offset[cell + 1] = linked;
+        type[cell] = VTK_POLYGON;
+        id[cell++] = (int64_t)i;
     }
 
     frame_file f;
     frame_open(&f, out, frame_part[FRAME_BODIES], number, view);
-    frame_grid(&f, (int)points, x, bodies->count, offset, link, type);
-    frame_put(&f, f.cell, "velocity", H5T_NATIVE_DOUBLE, n, 3, v);
-    frame_put(&f, f.cell, "id", H5T_NATIVE_INT64, n, 0, id);
+    frame_grid(&f, (int)points, x, (int)n_cell, offset, link, type);
+    frame_put(&f, f.cell, "velocity", H5T_NATIVE_DOUBLE, n_cell, 3, v);
+    frame_put(&f, f.cell, "id", H5T_NATIVE_INT64, n_cell, 0, id);
     free(x);
     free(v);
     free(link);

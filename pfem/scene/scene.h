@@ -288,10 +288,17 @@ typedef struct silt_contact_def {
 } silt_contact_def;
 
 typedef enum {
-    SHAPE_BOX = 1, // scale wide, height high
-    SHAPE_DISC,    // scale is the diameter
-    SHAPE_POLYGON, // points relative to any origin, simple polygon; scaled so that its width is `scale` if scale > 0
-    SHAPE_TEMPLE,  // columns under a roof, width `scale`; made in dem-coupling/shape.c
+    SHAPE_BOX = 1,  // scale wide, height high, in 3-D depth deep
+    SHAPE_DISC,     // 2-D, scale is the diameter
+    SHAPE_POLYGON,  // points relative to any origin, simple polygon; scaled so that its width is `scale` if scale > 0; 3-D: a prism
+                    // over points [x, z], depth deep
+    SHAPE_TEMPLE,   // columns under a roof, width `scale`; made in dem-coupling/shape.c and form.c
+    SHAPE_SPHERE,   // 3-D, scale is the diameter
+    SHAPE_CYLINDER, // 3-D, upright, scale is the diameter, height the length
+    SHAPE_CAPSULE,  // lies along x, scale long, height thick
+    SHAPE_WEDGE,    // isosceles, its edge down, scale wide, height high
+    SHAPE_TETRAPOD, // 3-D, scale high, one leg up
+    SHAPE_SURFACE,  // 3-D, a closed surface from `file`; its width made `scale` if scale > 0
 } silt_shape;
 typedef enum { MOTION_FREE = 0, MOTION_FIXED, MOTION_PRESCRIBED } silt_motion;
 /** components of a body's motion, bits of silt_body_def.held */
@@ -316,10 +323,13 @@ typedef struct silt_body_def {
     silt_shape shape;
     double at[3];   // of the centroid, m
     double angle;   // degrees
+    double axis[3]; // 3-D: what the angle turns about
     double scale;   // m, width
-    double height;  // m, box only; 0: scale
+    double height;  // m; 0: as the shape says
+    double depth;   // m, 3-D, along y; 0: scale
     double density; // kg/m3
     double velocity[3];
+    double spin[3]; // rad/s, 3-D, at the start
     silt_motion motion;
     silt_series path;  // MOTION_PRESCRIBED: a path (silt_path_at)
     double path_scale; // 1, factor on the numbers of its file
@@ -328,8 +338,10 @@ typedef struct silt_body_def {
     int n_spring;
     silt_spring_def *spring; // owned
     silt_release_def release;
+    double clump_error; // m, how far the spheres of its contacts may leave its surface; 0: as many as are usual
     int n_point;
     double *point; // owned, polygon only, 3 per point, counter-clockwise after reading
+    char *file;    // owned, surface only
 } silt_body_def;
 
 typedef enum {

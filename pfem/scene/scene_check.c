@@ -212,6 +212,13 @@ check_outside(silt_reader *reader, const silt_tree *node, const check_box *box, 
                       path, box->lo[0], box->lo[1], box->hi[0], box->hi[1]);
 }
 
+void silt_scene_check_within(silt_reader *reader, const silt_scene *scene, const silt_tree *node, const double *lo, const double *hi,
+                             double slack, int body) {
+    const check_box box = check_box_make(scene, true);
+    if (box.known && !check_box_holds(&box, lo, hi, slack))
+        check_outside(reader, node, &box, "bodies.%d.at", body);
+}
+
 // water, bed and grains where the walls can hold them
 static void check_inside(silt_reader *reader, const silt_scene *scene) {
     check_box walls = check_box_make(scene, false), box = check_box_make(scene, true);
@@ -271,166 +278,11 @@ static void check_period(silt_reader *reader, const silt_scene *scene) {
     }
 }
 
-// bodies -----------------------------------------------------------------------------------------------
-/** outline in place: a polygon, or a circle when n_point is 0 */
-typedef struct check_shape {
-    int n_point;
-    double *point;            // owned
-    double centre[2], radius; // circumscribed; the circle itself
-} check_shape;
-
-// a little smaller than the body: touching is allowed
-static check_shape check_shape_make(const silt_body_def *body) {
-    const double shrink = 1 - 1e-6;
-    check_shape shape = {.centre = {body->at[0], body->at[1]}};
-    double centre[3] = {0}, scale = 1;
-    double width = body->scale, height = body->shape == SHAPE_TEMPLE ? 0.8 * width
-                                         : body->height > 0          ? body->height
-                                                                     : width;
-    const double corner[12] = {-width / 2, -height / 2, 0, width / 2,  -height / 2, 0,
-                               width / 2,  height / 2,  0, -width / 2, height / 2,  0};
-    const double *point = corner;
-    shape.n_point = 4;
-    if (body->shape == SHAPE_DISC) {
-        shape.n_point = 0;
-        shape.radius = shrink * width / 2;
-        return shape;
-    }
-    if (body->shape == SHAPE_POLYGON) {
-        point = body->point;
-        shape.n_point = body->n_point;
-        silt_polygon_centroid(shape.n_point, point, centre);
-        double lo = HUGE_VAL, hi = -HUGE_VAL;
-        for (int i = 0; i < shape.n_point; i++) {
-            lo = silt_min(lo, point[3 * i]);
-            hi = silt_max(hi, point[3 * i]);
-        }
-        scale = body->scale > 0 ? body->scale / (hi - lo) : 1;
-    }
-    shape.point = silt_alloc((size_t)shape.n_point, 3 * sizeof *shape.point);
-    double turn = body->angle * M_PI / 180, c = cos(turn) * scale * shrink, s = sin(turn) * scale * shrink;
-    for (int i = 0; i < shape.n_point; i++) {
-        double x = point[3 * i] - centre[0], y = point[3 * i + 1] - centre[1];
-        shape.point[3 * i] = body->at[0] + c * x - s * y;
-        shape.point[3 * i + 1] = body->at[1] + s * x + c * y;
-        shape.radius = silt_max(shape.radius, hypot(c * x - s * y, s * x + c * y));
-    }
-    return shape;
-}
-
-// circles first, they are cheap
-static bool check_shapes_overlap(const check_shape *a, const check_shape *b) {
-    if (hypot(a->centre[0] - b->centre[0], a->centre[1] - b->centre[1]) >= a->radius + b->radius)
-        return false;
-    if (a->n_point == 0 && b->n_point == 0)
-        return true;
-    if (a->n_point == 0) {
-        const check_shape *other = a;
-        a = b;
-        b = other;
-    }
-    // a is a polygon now; b lies in it, crosses it, or holds it
-    if (b->n_point == 0) {
-        bool near = silt_polygon_contains(a->n_point, a->point, b->centre);
-        for (int i = 0; i < a->n_point && !near; i++)
-            near = silt_segment_distance(a->point + 3 * i, a->point + 3 * ((i + 1) % a->n_point), b->centre) < b->radius;
-        return near;
-    }
-    for (int i = 0; i < a->n_point; i++)
-        for (int k = 0; k < b->n_point; k++)
-            if (silt_segments_meet(a->point + 3 * i, a->point + 3 * ((i + 1) % a->n_point), b->point + 3 * k,
-                                   b->point + 3 * ((k + 1) % b->n_point)))
-                return true;
-    return silt_polygon_contains(a->n_point, a->point, b->point) ||
-           silt_polygon_contains(b->n_point, b->point, a->point);
-}
-
-// box around the outline
-static void check_shape_bounds(const check_shape *shape, double lo[2], double hi[2]) {
-    for (int k = 0; k < 2; k++) {
-        lo[k] = shape->n_point ? HUGE_VAL : shape->centre[k] - shape->radius;
-        hi[k] = shape->n_point ? -HUGE_VAL : shape->centre[k] + shape->radius;
-        for (int i = 0; i < shape->n_point; i++) {
-            lo[k] = silt_min(lo[k], shape->point[3 * i + k]);
-            hi[k] = silt_max(hi[k], shape->point[3 * i + k]);
-        }
-    }
-}
-
-// the reader let capitals through, for gauges
-static bool check_body_name(const char *name) {
-    for (const char *c = name; *c; c++)
-        if (*c >= 'A' && *c <= 'Z')
-            return false;
-    return true;
-}
-
-typedef struct check_span {
-    double left;
-    int index;
-} check_span;
-
-static int check_span_order(const void *a, const void *b) {
-    const check_span *p = a, *q = b;
-    return p->left != q->left ? (p->left < q->left ? -1 : 1) : p->index - q->index;
-}
-
-// names, sizes, places; then pairs that overlap
-static void check_bodies(silt_reader *reader, const silt_scene *scene) {
-    int n = scene->n_body, n_span = 0;
-    check_box box = check_box_make(scene, true);
-    check_shape *shape = silt_alloc((size_t)n, sizeof *shape);
-    check_span *span = silt_alloc((size_t)n, sizeof *span);
-    for (int i = 0; i < n; i++) {
-        const silt_body_def *body = &scene->body[i];
-        const silt_tree *node = silt_tree_find(reader->root, "bodies.%d", i);
-        if (body->name && !check_body_name(body->name))
-            silt_complain(reader, silt_tree_item(node, "name"),
-                          "key 'bodies.%d.name': found '%s', allowed a name of small "
-                          "letters, digits and underscores that begins with a letter",
-                          i, body->name);
-        bool sized = body->scale > 0 || (body->shape == SHAPE_POLYGON && body->n_point);
-        if (body->shape && body->shape != SHAPE_POLYGON && body->scale == 0) {
-            const silt_tree *scale = silt_tree_item(node, "scale");
-            silt_complain(reader, scale ? scale : node, "key 'bodies.%d.scale': found %s, allowed a number in m, > 0",
-                          i, scale ? "no usable width" : "nothing in this block");
-        }
-        // only bodies that are whole so far have a place
-        if (!body->shape || !sized || !silt_tree_item(node, "at") || (body->shape == SHAPE_POLYGON && !body->n_point))
-            continue;
-        shape[i] = check_shape_make(body);
-        double lo[2], hi[2];
-        check_shape_bounds(&shape[i], lo, hi);
-        if (box.known && !check_box_holds(&box, lo, hi, 1e-3 * shape[i].radius))
-            check_outside(reader, silt_tree_item(node, "at"), &box, "bodies.%d.at", i);
-        span[n_span++] = (check_span){shape[i].centre[0] - shape[i].radius, i};
-    }
-    // overlapping pairs, found along x
-    qsort(span, (size_t)n_span, sizeof *span, check_span_order);
-    for (int p = 0; p < n_span; p++) {
-        const check_shape *a = &shape[span[p].index];
-        for (int q = p + 1; q < n_span && span[q].left < a->centre[0] + a->radius; q++) {
-            if (reader->n_complaint > SCENE_COMPLAINTS || !check_shapes_overlap(a, &shape[span[q].index]))
-                continue;
-            int late = span[p].index > span[q].index ? span[p].index : span[q].index;
-            int early = span[p].index + span[q].index - late;
-            silt_complain(
-                reader, silt_tree_find(reader->root, "bodies.%d.at", late),
-                "key 'bodies.%d.at': found the body overlapping body '%s', allowed bodies apart from each other", late,
-                scene->body[early].name ? scene->body[early].name : "?");
-        }
-    }
-    for (int i = 0; i < n; i++)
-        free(shape[i].point);
-    free(shape);
-    free(span);
-}
-
 // grains that fill regions -----------------------------------------------------------------------------
 /** what they keep clear of */
 typedef struct check_clear {
     const silt_scene *scene;
-    check_shape *body; // owned, one per body
+    silt_body_shape *body; // owned, one per body
 } check_clear;
 
 // from the wall's elements, and not inside of an obstacle; where surfaces from files lie is not known here
@@ -458,21 +310,22 @@ static bool check_clear_at(const void *context, const double *x, double radius) 
     for (int i = 0; i < scene->bed.n_region; i++)
         if (silt_region_depth(&scene->bed.region[i], x) > -reach)
             return false;
-    const check_shape grain = {.centre = {x[0], x[1]}, .radius = reach};
     for (int i = 0; i < scene->n_body; i++)
-        if (check_shapes_overlap(&clear->body[i], &grain))
+        if (silt_body_shape_near(&clear->body[i], x, reach))
             return false;
     return true;
 }
 
 // what all keys are sound for
 static void check_fill(silt_reader *reader, silt_scene *scene) {
-    if (reader->n_complaint > 0 || scene->grains.n_fill == 0)
+    if (reader->n_complaint > 0 || (scene->grains.n_fill == 0 && scene->grains.n_grain == 0))
         return;
     check_clear clear = {scene, silt_alloc((size_t)scene->n_body + 1, sizeof *clear.body)};
     for (int i = 0; i < scene->n_body; i++)
-        clear.body[i] = check_shape_make(&scene->body[i]);
-    silt_scene_fill(reader, scene, check_clear_at, &clear);
+        clear.body[i] = silt_body_shape_make(scene, &scene->body[i]);
+    silt_scene_check_grains(reader, scene, check_clear_at, &clear);
+    if (scene->grains.n_fill > 0)
+        silt_scene_fill(reader, scene, check_clear_at, &clear);
     for (int i = 0; i < scene->n_body; i++)
         free(clear.body[i].point);
     free(clear.body);
@@ -490,7 +343,7 @@ static const char *const check_fixed[] = {
     "step", "time", "dt", "n_node", "n_cell", "fluid_volume", "flying_volume", "mesh_volume", "fluid_mass",
     "volume_error", "kinetic_energy", "potential_energy", "momentum_x", "momentum_y", "momentum_z", "momentum_error",
     "external_work", "dissipation", "max_speed", "volume_solved", "volume_moved", "volume_reconnected",
-    "volume_refined", "volume_given", "volume_owed", "y_plus", "angular_momentum_x", "angular_momentum_y",
+    "volume_refined", "volume_given", "volume_owed", "owed_energy", "y_plus", "angular_momentum_x", "angular_momentum_y",
     "angular_momentum_z", "bed_mass", "released_mass", "deposited_mass", "pore_water_mass", "bed_shear", "bed_work",
     "bed_y_plus", "seepage", "seepage_volume", "seepage_lost", "grain_count", "grain_mass", "grain_velocity_x",
     "grain_velocity_y", "grain_velocity_z", "grain_kinetic_energy", "grain_potential_energy", "grain_water_x",
@@ -769,7 +622,7 @@ void silt_scene_check(silt_reader *reader, silt_scene *scene) {
     silt_scene_check_openings(reader, scene, box.lo, box.hi);
     check_inside(reader, scene);
     check_period(reader, scene);
-    check_bodies(reader, scene);
+    silt_scene_check_bodies(reader, scene);
     silt_scene_check_motion(reader, scene);
     check_gauges(reader, scene);
     int n;

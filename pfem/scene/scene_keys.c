@@ -48,7 +48,9 @@ static const silt_word drag_words[] = {
 static const silt_word arrange_words[] = {{"random", ARRANGE_RANDOM}, {"lattice", ARRANGE_LATTICE}, {0}};
 static const silt_word lift_words[] = {{"none", LIFT_NONE}, {"saffman", LIFT_SAFFMAN}, {0}};
 static const silt_word shape_words[] = {
-    {"box", SHAPE_BOX}, {"disc", SHAPE_DISC}, {"polygon", SHAPE_POLYGON}, {"temple", SHAPE_TEMPLE}, {0}};
+    {"box", SHAPE_BOX},           {"disc", SHAPE_DISC},       {"polygon", SHAPE_POLYGON}, {"temple", SHAPE_TEMPLE},     {"sphere", SHAPE_SPHERE},
+    {"cylinder", SHAPE_CYLINDER}, {"capsule", SHAPE_CAPSULE}, {"wedge", SHAPE_WEDGE},     {"tetrapod", SHAPE_TETRAPOD}, {"surface", SHAPE_SURFACE},
+    {0}};
 static const silt_word motion_words[] = {
     {"free", MOTION_FREE}, {"fixed", MOTION_FIXED}, {"prescribed", MOTION_PRESCRIBED}, {0}};
 static const silt_word held_words[] = {{"x", HELD_X}, {"y", HELD_Y}, {"z", HELD_Z}, {"angle", HELD_ANGLE}, {0}};
@@ -511,7 +513,7 @@ static const silt_key contact_rows[] = {
      .doc = "Young's modulus of the walls; a thousand times that of the grains is rigid"},
     {"poissons_ratio", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 0.5), AT(silt_contact_def, poissons_ratio),
      .doc = "of grains and bodies"},
-    {"restitution", KEY_NUMBER, RANGE(0.05, 1), AT(silt_contact_def, restitution), .doc = "coefficient of restitution"},
+    {"restitution", KEY_NUMBER, .flags = KEY_OPEN_LOW, RANGE(0.05, 1), AT(silt_contact_def, restitution), .doc = "coefficient of restitution"},
     {"friction", KEY_NUMBER, RANGE(0, 10), AT(silt_contact_def, friction), .doc = "coefficient of sliding friction"},
     {"rolling_friction", KEY_NUMBER, RANGE(0, 10), AT(silt_contact_def, rolling_friction),
      .doc = "coefficient of rolling friction"},
@@ -544,15 +546,25 @@ TABLE(release, "until when the body is held", silt_body_def, -1);
 
 static const silt_key body_rows[] = {
     {"name", KEY_NAME, AT(silt_body_def, name), .doc = "begins its columns in history.csv"},
-    {"shape", KEY_WORD, .flags = KEY_SELECTOR, .words = shape_words, AT(silt_body_def, shape), .doc = "outline"},
+    {"shape", KEY_WORD, .flags = KEY_SELECTOR, .words = shape_words, AT(silt_body_def, shape),
+     .doc = "outline; disc in 2-D only, sphere, cylinder, tetrapod and surface in 3-D only"},
     {"at", KEY_POINT, .unit = "m", AT(silt_body_def, at), .doc = "centroid"},
-    {"angle", KEY_NUMBER, .unit = "degrees", .fallback = "0", AT(silt_body_def, angle), .doc = "counter-clockwise"},
+    {"angle", KEY_NUMBER, .unit = "degrees", .fallback = "0", AT(silt_body_def, angle),
+     .doc = "counter-clockwise, in 3-D seen from the tip of the axis"},
+    {"axis", KEY_POINT, .flags = KEY_SPACE, .fallback = "[0, 0, 1]", AT(silt_body_def, axis), .doc = "what the angle turns about"},
     {"scale", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_body_def, scale),
-     .doc = "width, or diameter of a disc; 0: a polygon as its points are, the others need it"},
-    {"height", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, .when = ONLY(SHAPE_BOX),
-     AT(silt_body_def, height), .doc = "of a box; 0: as wide as high"},
+     .doc = "width, diameter of a disc, sphere or cylinder, length of a capsule, height of a tetrapod; 0: a polygon or surface as it is, "
+            "the others need it"},
+    {"height", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE,
+     .when = ONLY(SHAPE_BOX) | ONLY(SHAPE_CYLINDER) | ONLY(SHAPE_CAPSULE) | ONLY(SHAPE_WEDGE), AT(silt_body_def, height),
+     .doc = "of a box or wedge, length of a cylinder, thickness of a capsule; 0: as the scale, of a capsule half of it"},
+    {"depth", KEY_NUMBER, .unit = "m", .fallback = "0", .flags = KEY_SPACE, .low = 0, .high = HUGE_VAL,
+     .when = ONLY(SHAPE_BOX) | ONLY(SHAPE_POLYGON) | ONLY(SHAPE_TEMPLE) | ONLY(SHAPE_WEDGE), AT(silt_body_def, depth),
+     .doc = "along y; 0: as wide as deep"},
     {"density", KEY_NUMBER, .unit = "kg/m3", POSITIVE, AT(silt_body_def, density), .doc = "mean of the body"},
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_body_def, velocity), .doc = "at the start"},
+    {"spin", KEY_POINT, .unit = "rad/s", .flags = KEY_SPACE, .fallback = "[0, 0, 0]", AT(silt_body_def, spin),
+     .doc = "angular velocity at the start"},
     {"motion", KEY_WORD, .fallback = "free", .words = motion_words, AT(silt_body_def, motion),
      .doc = "free to move, held where it is, or moved by `path` whatever acts on it"},
     {"path", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_body_def, path),
@@ -566,8 +578,12 @@ static const silt_key body_rows[] = {
      .doc = "springs and mooring lines of a free body"},
     {"release", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &release_table, .presence = PRESENT_FLAG, .present = offsetof(silt_body_def, release.on),
      .doc = "a free body that is held until a time or until a force acts on it"},
+    {"clump_error", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_body_def, clump_error),
+     .doc = "how far the spheres of its contacts may leave its surface; 0: as usual"},
     {"points", KEY_POLYGON, .unit = "m", .when = ONLY(SHAPE_POLYGON), MANY(silt_body_def, n_point, point),
-     .doc = "corners of a polygon about any origin"},
+     .doc = "corners of a polygon about any origin, in 3-D [x, z] of a prism along y"},
+    {"file", KEY_SURFACE, .when = ONLY(SHAPE_SURFACE), AT(silt_body_def, file),
+     .doc = "closed surface, STL or gmsh, triangles counter-clockwise from outside"},
     {0}};
 TABLE(body, "a body", silt_body_def, offsetof(silt_body_def, shape));
 
@@ -707,7 +723,7 @@ static const silt_key scene_rows[] = {
     {"contact", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &contact_table, .presence = PRESENT_FLAG,
      .present = offsetof(silt_scene, contact.on), AT(silt_scene, contact),
      .doc = "how solids touch; needed with a bed, grains or bodies"},
-    {"bodies", KEY_LIST, .flags = KEY_OPTIONAL | KEY_PLANE, .sub = &body_table, MANY(silt_scene, n_body, body),
+    {"bodies", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &body_table, MANY(silt_scene, n_body, body),
      .doc = "rigid objects"},
     {"gauges", KEY_LIST, .flags = KEY_OPTIONAL, .sub = &gauge_table, MANY(silt_scene, n_gauge, gauge),
      .doc = "what is measured at every step"},

@@ -184,10 +184,26 @@ void silt_scene_settle(silt_reader *reader, silt_scene *scene);
 void silt_scene_check(silt_reader *reader, silt_scene *scene);
 /** Inlets and outlets (scene_openings.c). @param lo, hi  of the box that walls and water span, hi < lo: not known */
 void silt_scene_check_openings(silt_reader *reader, const silt_scene *scene, const double lo[3], const double hi[3]);
-/** true where a grain of that radius at x touches no wall, bed or body */
-typedef bool silt_fill_clear(const void *context, const double *x, double radius);
+/** Rigid objects (scene_bodies.c) */
+void silt_scene_check_bodies(silt_reader *reader, const silt_scene *scene);
+/** A complaint at the node where lo to hi, of a body, leaves what walls and water span by more than slack (scene_check.c) */
+void silt_scene_check_within(silt_reader *reader, const silt_scene *scene, const silt_tree *node, const double *lo, const double *hi,
+                             double slack, int body);
+/** a body's outline in place: a polygon, or a circle when n_point is 0; in space a sphere around it */
+typedef struct silt_body_shape {
+    int dim, n_point;
+    double *point;            // owned
+    double centre[3], radius; // circumscribed; the circle itself
+} silt_body_shape;
+silt_body_shape silt_body_shape_make(const silt_scene *scene, const silt_body_def *body);
+/** true where a circle or sphere of that radius at x meets it */
+bool silt_body_shape_near(const silt_body_shape *shape, const double *x, double radius);
 /** What moves bodies (scene_motion.c). */
 void silt_scene_check_motion(silt_reader *reader, const silt_scene *scene);
+/** true where a grain of that radius at x touches no wall, bed or body */
+typedef bool silt_fill_clear(const void *context, const double *x, double radius);
+/** Grains of the list that stand in each other, in a wall, the bed or a body: contacts would throw them apart (fill.c). Fixed ones may. */
+void silt_scene_check_grains(silt_reader *reader, const silt_scene *scene, silt_fill_clear *clear, const void *context);
 /** Fills grains.regions into grains.filled; a complaint where more is asked for than fits (fill.c). */
 void silt_scene_fill(silt_reader *reader, silt_scene *scene, silt_fill_clear *clear, const void *context);
 /** the resolved scene as YAML; owned by the caller. names: files with their folder (true), or their last part only */

@@ -65,6 +65,8 @@ static inline int wall_dim(const silt_walls *walls) { return walls->dim == 3 ? 3
 const double *wall_corner(const silt_walls *walls, int e, int k, double room[3]);
 /** Nearest point of the element to x; feature: 0 the inside, 1 + k edge k, 4 + k corner k. @return the distance squared */
 double wall_nearest(const silt_walls *walls, int e, const double x[3], double on[3], int *feature);
+/** the same for a triangle's corners; feature as above */
+double wall_nearest_on_triangle(const double c[3][3], const double *x, double on[3], int *feature);
 /** how far x lies inside of each edge (3-D) or end (2-D), in the plane of the element */
 void wall_inside(const silt_walls *walls, int e, const double x[3], double in[3]);
 /** element joined across edge k, -1 */

@@ -69,7 +69,7 @@ static double nearest_on_segment(const double *a, const double *b, const double 
 }
 
 // the regions of the triangle's corners, edges and inside in turn (Ericson, Real-Time Collision Detection, 5.1.5)
-static double nearest_on_triangle(const double c[3][3], const double *x, double on[3], int *feature) {
+double wall_nearest_on_triangle(const double c[3][3], const double *x, double on[3], int *feature) {
     double ab[3], ac[3], ax[3], bx[3], cx[3];
     for (int d = 0; d < 3; d++) {
         ab[d] = c[1][d] - c[0][d];
@@ -105,7 +105,7 @@ static double nearest_on_triangle(const double c[3][3], const double *x, double 
 }
 
 double wall_nearest(const silt_walls *walls, int e, const double x[3], double on[3], int *feature) {
-    return walls->dim == 3 ? nearest_on_triangle(walls->corner[e], x, on, feature)
+    return walls->dim == 3 ? wall_nearest_on_triangle(walls->corner[e], x, on, feature)
                            : nearest_on_segment(walls->from[e], walls->to[e], x, on, feature);
 }
 
