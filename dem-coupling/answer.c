@@ -31,6 +31,7 @@ void silt_coupling_keep_old(silt_coupling *c) {
     const size_t n_wall = (size_t)c->walls->count, n_motion = (size_t)c->n_motion, n_body = (size_t)c->bodies->count;
     if (!old->body) {
         old->body = silt_alloc(n_body + 1, sizeof *old->body);
+        old->freed = silt_alloc(n_body + 1, sizeof *old->freed);
         old->wall = silt_alloc(n_wall + 1, sizeof *old->wall);
         old->triangle = silt_alloc(n_wall + 1, sizeof *old->triangle);
         old->centre = silt_alloc(n_motion + 1, sizeof *old->centre);
@@ -42,6 +43,8 @@ void silt_coupling_keep_old(silt_coupling *c) {
     if (c->n_grain)
         memcpy(old->grain, c->grain, (size_t)c->n_grain * sizeof *c->grain);
     memcpy(old->body, c->bodies->body, n_body * sizeof *old->body);
+    for (int i = 0; i < c->bodies->count; i++)
+        old->freed[i] = c->body[i].freed;
     memcpy(old->wall, c->wall, n_wall * sizeof *old->wall);
     memcpy(old->triangle, c->triangle, n_wall * sizeof *old->triangle);
     memcpy(old->centre, c->centre, n_motion * sizeof *old->centre);
@@ -60,6 +63,8 @@ void silt_coupling_take_old(silt_coupling *c) {
     if (c->n_grain)
         memcpy(c->grain, old->grain, (size_t)c->n_grain * sizeof *c->grain);
     memcpy(c->bodies->body, old->body, (size_t)c->bodies->count * sizeof *old->body);
+    for (int i = 0; i < c->bodies->count; i++)
+        c->body[i].freed = old->freed[i];
     memcpy(c->wall, old->wall, (size_t)c->walls->count * sizeof *old->wall);
     memcpy(c->triangle, old->triangle, (size_t)c->walls->count * sizeof *old->triangle);
     memcpy(c->centre, old->centre, (size_t)c->n_motion * sizeof *old->centre);
@@ -75,6 +80,7 @@ void silt_coupling_forget_old(silt_coupling *c) {
     coupling_old *old = &c->old;
     free(old->grain);
     free(old->body);
+    free(old->freed);
     free(old->wall);
     free(old->triangle);
     free(old->centre);

@@ -35,6 +35,7 @@ typedef struct coupling_old {
     int n_grain, grain_capacity;
     coupling_grain *grain;     // owned
     struct silt_body *body;    // owned
+    bool *freed;
     double (*wall)[4], (*triangle)[10], (*centre)[4], (*pivot)[3]; // owned
     double left[3];
     int64_t left_count;
@@ -58,6 +59,7 @@ typedef struct coupling_body {
     silt_clump clump;
     bool fixed;
     bool freed; // its release has come
+    double first[4]; // orientation at the start
     double old_v[3];
 } coupling_body;
 
@@ -79,6 +81,7 @@ struct silt_coupling {
     bool accelerates;        // one of them does so within a step: its rate is told substep by substep
     unsigned char *guide;    // owned, what the worker is told besides forces (guide.h)
     int guide_capacity;
+    FILE *trace;             // owned, NULL: none is asked for
     double width;            // m, accounting width: spheres stand for what is in this width of the slab; 1 in space
     double step;             // s, of the discrete elements
     double parcel;           // m, usual radius of a parcel, 0 without bed
@@ -165,6 +168,9 @@ void silt_coupling_forget_old(silt_coupling *coupling);
 /** Surfaces, clumps, masses and places of the scene's bodies. Errors (SILT_INPUT): a shape that cannot be, that is too thin for the
  * water's mesh, that lies behind a wall or in another body. */
 silt_status silt_coupling_bodies(silt_coupling *coupling, silt_error *err);
+/** in space: how a body is turned by an angle, radians, about its axis */
+void silt_coupling_orientation(const silt_body_def *def, double angle, double q[4]);
+silt_status silt_coupling_describe(const silt_scene *scene, FILE *to, silt_error *err);
 void silt_coupling_bodies_clear(silt_coupling *coupling);
 /** m, wanted distance between the water's nodes on a body, fluid.size or what fluid.sizes say there; radius: of the body */
 double silt_coupling_body_size(const silt_scene *scene, const silt_body_def *def, double radius);
@@ -186,10 +192,17 @@ void silt_coupling_wall_rates(silt_coupling *coupling, int m, int n, double (*ra
 // guide.c
 /** Tells the worker what guides bodies and walls in the next n substeps; nothing where nothing does. After silt_coupling_walls_go. */
 void silt_coupling_guide(silt_coupling *coupling, int n);
-/** after the run: who was set free */
-void silt_coupling_guided(silt_coupling *coupling);
+/** after the run: who was set free, what was traced */
+silt_status silt_coupling_guided(silt_coupling *coupling, silt_error *err);
 /** to and from a checkpoint: who was */
 silt_status silt_coupling_freed(silt_coupling *coupling, bool out, silt_store *store, silt_error *err);
+// trace.c
+struct dem_guide;
+/** Opens the file that contact.trace asks for; resumed: what it holds after `time` is cut. */
+silt_status silt_trace_open(silt_coupling *coupling, const char *path, bool resumed, double time, silt_error *err);
+int silt_trace_count(const silt_coupling *coupling); /**< forces in a row */
+void silt_trace_ask(const silt_coupling *coupling, struct dem_guide *guide);
+silt_status silt_trace_write(silt_coupling *coupling, const struct dem_guide *told, silt_error *err);
 /** where the path of a prescribed body has it at a time: x, y, z in m, angle in radians */
 void silt_coupling_place(const silt_coupling *coupling, int body, double time, double place[4]);
 

@@ -159,11 +159,10 @@ static void fails_and_leaves(const char *path, int n_set, const char *const *set
     begin(&run, &scene, path, n_set, set);
     steps(&run, before);
     const double dt = run.dt;
-    const double owed = thrown ? run.body_carry[0][0] : 0;
-    const double tolerance = scene->fluid.tolerance;
+    const double tolerance = scene->fluid.tolerance, carry = thrown ? run.body_carry[0][0] : 0;
     const int iterations = scene->fluid.iterations;
     if (thrown)
-        run.body_carry[0][0] = 1e9;
+        run.body_carry[0][0] = 1e9; // N s, that the water owes it
     else {
         // nothing can converge to this
         scene->fluid.tolerance = 1e-30;
@@ -192,7 +191,7 @@ static void fails_and_leaves(const char *path, int n_set, const char *const *set
     scene->fluid.tolerance = tolerance;
     scene->fluid.iterations = iterations;
     if (thrown)
-        run.body_carry[0][0] = owed;
+        run.body_carry[0][0] = carry;
     steps(&run, after);
     const bits mended = take_bits(&run);
     end(&run, &scene);

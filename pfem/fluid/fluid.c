@@ -370,8 +370,7 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
             any |= f->shift[D * i + d] != 0;
         }
     for (int pass = 0; pass < 2 && any; pass++) {
-        if (!pass)
-            memset(f->increment, 0, (size_t)f->n_node * sizeof(double));
+        memset(f->increment, 0, (size_t)f->n_node * sizeof(double));
         silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
         for (int i = 0; i < f->n_node; i++)
             f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
