@@ -144,6 +144,7 @@ silt_status silt_coupling_bodies(silt_coupling *c, silt_error *err) {
         c->bodies->body[i].n_sphere = c->body[i].clump.n_sphere;
         c->bodies->body[i].clump_error = c->body[i].clump.error;
     }
+    silt_coupling_held(c);
     return c->dim == 3 ? bodies_apart(c, err) : SILT_OK;
 }
 

@@ -128,7 +128,7 @@ EXCHANGE smooth(const int D, silt_exchange *e, const double *water) {
             for (int k = 0; k < D; k++)
                 read[n_field * cell->at[a] + READ_GRADIENT(D, k)] += sum[k];
     }
-    silt_kernel_solve(&e->kernel, n_field, read);
+    silt_kernel_sample(&e->kernel, n_field, read);
 }
 
 void silt_exchange_slope(const silt_exchange *e, int near, double slope[4][3]) { BY_DIM(e, exchange_slope, e, &e->cell[near], slope); }
@@ -138,6 +138,20 @@ void silt_exchange_slope(const silt_exchange *e, int near, double slope[4][3]) {
 static void exchange_smooth(silt_exchange *e, const double *water) { BY_DIM(e, smooth, e, water); }
 
 // ---------------------------------------------------------------- parts of a step
+
+// the rows of the kernel that a grain has to do with
+static void exchange_rows(const silt_exchange *e, const silt_exchange_grain *g, int place[4], double weight[4]) {
+    const int D = e->dim, *node = e->mesh->cell[g->cell];
+    for (int a = 0; a <= D; a++) {
+        place[a] = e->layer_grain > 0.0 ? 0 : e->kernel.place[node[a]];
+        weight[a] = e->layer_grain > 0.0 ? 0.0 : g->weight[a];
+    }
+    if (e->layer_grain > 0.0) {
+        place[0] = silt_kernel_layer(&e->kernel, g->x[D - 1], &weight[1]);
+        place[1] = place[0] + 1;
+        weight[0] = 1.0 - weight[1];
+    }
+}
 
 // what does not change within a step, of grains in the water in groups of eight
 static void exchange_pack(silt_exchange *e, double dt) {
@@ -153,9 +167,9 @@ static void exchange_pack(silt_exchange *e, double dt) {
             const silt_exchange_grain *g = &e->grain[e->wet[idle ? e->n_wet - 1 : DRAG_GROUP * m + i]];
             const int *node = e->mesh->cell[g->cell];
             solid[i] = 0.0;
+            exchange_rows(e, g, to->place[i], to->weight[i]);
             for (int a = 0; a <= D; a++) {
-                to->place[i][a] = e->kernel.place[node[a]];
-                to->weight[i][a] = idle ? 0.0 : g->weight[a];
+                to->weight[i][a] = idle ? 0.0 : to->weight[i][a];
                 solid[i] += g->weight[a] * e->solid[node[a]];
             }
             diameter[i] = g->diameter;
@@ -367,9 +381,9 @@ static void exchange_update(void *self, const double *velocity, const double *pr
     exchange_smooth(e, e->seen);
     if (silt_forces_sheared(&e->force))
         silt_force_fields(e);
-    memset(e->give, 0, GIVE_FIELDS * ((size_t)e->n_look + 1) * sizeof *e->give);
+    memset(e->give, 0, GIVE_FIELDS * ((size_t)e->n_row + 1) * sizeof *e->give);
     exchange_give(e, e->refresh || fresh);
-    silt_kernel_solve(&e->kernel, GIVE_FIELDS, e->give);
+    silt_kernel_spread(&e->kernel, GIVE_FIELDS, e->give);
     exchange_take(e, velocity, dt);
     if (e->force.def.spin)
         silt_force_couple(e);
@@ -475,7 +489,7 @@ static void exchange_choose_along(silt_exchange *e, double reach) {
 
 static void exchange_choose(silt_exchange *e) {
     exchange_mark(e);
-    if (e->n_wet > 0 && e->layers)
+    if (e->n_wet > 0 && e->layer_grain > 0.0)
         memcpy(e->chosen, e->mesh->wet, (size_t)e->mesh->n_node);
     else if (e->n_wet > 0 && (e->dim == 3 || e->mesh->period[0] > 0.0))
         exchange_choose_along(e, (e->dim == 3 ? sweep_reach : kernel_reach) * e->width);
@@ -518,10 +532,30 @@ static void exchange_look(silt_exchange *e) {
     }
 }
 
+// the same in layers, with room that what is read has no use for yet
+static void exchange_solid_layers(silt_exchange *e) {
+    memset(e->read, 0, ((size_t)e->n_row + 1) * sizeof *e->read);
+    for (int p = 0; p < e->n_wet; p++) {
+        const silt_exchange_grain *g = &e->grain[e->wet[p]];
+        int place[4];
+        double weight[4];
+        exchange_rows(e, g, place, weight);
+        for (int a = 0; a < 2; a++)
+            e->read[place[a]] += weight[a] * g->immersed;
+    }
+    silt_kernel_spread(&e->kernel, 1, e->read);
+    for (int m = 0; m < e->kernel.n_node; m++)
+        e->solid[e->kernel.node[m]] = e->read[m];
+}
+
 // solid fraction
 static void exchange_solid(silt_exchange *e) {
     const silt_mesh *mesh = e->mesh;
     memset(e->solid, 0, (size_t)e->n_node * sizeof *e->solid);
+    if (e->layer_grain > 0.0) {
+        exchange_solid_layers(e);
+        return;
+    }
     for (int p = 0; p < e->n_wet; p++) {
         const silt_exchange_grain *g = &e->grain[e->wet[p]];
         for (int a = 0; a <= e->dim; a++)
@@ -569,10 +603,11 @@ silt_status silt_exchange_place(silt_exchange *e, const silt_nodes *nodes, const
     SILT_RESERVE(e->index, e->node_capacity[8], n);
     SILT_RESERVE(e->placed_x, e->node_capacity[7], D * n);
     exchange_choose(e);
-    SILT_TRY(silt_kernel_build(&e->kernel, mesh, nodes->x, e->chosen, e->width, e->layers, err));
+    SILT_TRY(silt_kernel_build(&e->kernel, mesh, nodes->x, e->chosen, e->width, e->layer_grain, err));
     exchange_look(e);
-    SILT_RESERVE(e->read, e->node_capacity[4], READ_FIELDS(D) * (e->n_look + 1));
-    SILT_RESERVE(e->give, e->node_capacity[5], GIVE_FIELDS * (e->n_look + 1));
+    e->n_row = silt_kernel_rows(&e->kernel) > e->n_look ? silt_kernel_rows(&e->kernel) : e->n_look;
+    SILT_RESERVE(e->read, e->node_capacity[4], READ_FIELDS(D) * (e->n_row + 1));
+    SILT_RESERVE(e->give, e->node_capacity[5], GIVE_FIELDS * (e->n_row + 1));
 
     for (int p = 0; p < e->n_wet; p++)
         e->grain[e->wet[p]].immersed = e->grain[e->wet[p]].solid;

@@ -55,7 +55,7 @@ typedef struct exchange_cell {
 
 /** eight grains in the water: what a step's updates read and write of them */
 typedef struct exchange_group {
-    int place[DRAG_GROUP][4];      // of the corners of the grain's cell, in the kernel's order
+    int place[DRAG_GROUP][4];      // rows of the kernel: the corners of the grain's cell, or the hats around it
     double weight[DRAG_GROUP][4];
     double number[DRAG_NUMBERS][DRAG_GROUP]; // of the drag law
     double pace[DRAG_GROUP];                 // s m/kg, dt/m
@@ -71,7 +71,7 @@ typedef struct silt_exchange {
     double density, viscosity; // of the water
     double gravity[3];
     double width; // m, of the kernel
-    bool layers;  // it takes means along x (space: and y), in layers
+    double layer_grain; // m, their diameter where the kernel takes means along x (space: and y), in layers, else 0
     bool gusts;   // grains have some
     silt_forces force; // its def; forces besides drag and pressure gradient
     bool refresh; // update also renews the coefficients; the fluid must then read them anew
@@ -92,6 +92,7 @@ typedef struct silt_exchange {
     double *read, *give;                         // owned, fields through the kernel, in its order
     struct exchange_cell *cell;                          // owned, cells near to a node that the kernel holds
     int n_wet, *wet;                                     // owned, grains in the water
+    int n_row; // of what the grains read and give
     int n_group;
     struct exchange_group *group; // owned, of those
     uint8_t *chosen;                             // owned, per node: the kernel holds it

@@ -71,8 +71,8 @@ void silt_force_fields(silt_exchange *e) {
     silt_forces *f = &e->force;
     const int D = force_dim(e), n_row = force_row(D), n_curl = force_curls(D);
     const double *velocity = (const double *)e->seen;
-    SILT_RESERVE(f->field, f->field_capacity, n_row * (e->n_look + 1));
-    memset(f->field, 0, (size_t)(n_row * (e->n_look + 1)) * sizeof *f->field);
+    SILT_RESERVE(f->field, f->field_capacity, n_row * (e->n_row + 1));
+    memset(f->field, 0, (size_t)(n_row * (e->n_row + 1)) * sizeof *f->field);
     if (f->def.viscous)
         force_stress(e, D, velocity);
     for (int c = 0; c < e->kernel.n_near; c++) {
@@ -98,7 +98,7 @@ void silt_force_fields(silt_exchange *e) {
                 row[n_curl + k] += pull[k];
         }
     }
-    silt_kernel_solve(&e->kernel, n_row, f->field);
+    silt_kernel_sample(&e->kernel, n_row, f->field);
 }
 
 // ---------------------------------------------------------------- eight grains
@@ -206,14 +206,14 @@ void silt_force_couple(silt_exchange *e) {
     silt_forces *f = &e->force;
     const int D = force_dim(e), n_row = 4, n_curl = force_curls(D);
     const double *x = (const double *)e->middle;
-    SILT_RESERVE(f->field, f->field_capacity, n_row * (e->n_look + 1));
-    memset(f->field, 0, (size_t)(n_row * (e->n_look + 1)) * sizeof *f->field);
+    SILT_RESERVE(f->field, f->field_capacity, n_row * (e->n_row + 1));
+    memset(f->field, 0, (size_t)(n_row * (e->n_row + 1)) * sizeof *f->field);
     for (int m = 0; m < e->n_group; m++)
         for (int i = 0; i < DRAG_GROUP; i++)
             for (int a = 0; a <= D; a++)
                 for (int k = 0; k < n_curl; k++)
                     f->field[n_row * e->group[m].place[i][a] + k] -= e->group[m].weight[i][a] * f->group[m].torque[k][i];
-    silt_kernel_solve(&e->kernel, n_row, f->field);
+    silt_kernel_spread(&e->kernel, n_row, f->field);
     memset(f->field + n_row * e->kernel.n_node, 0, (size_t)(n_row * (e->n_look + 1 - e->kernel.n_node)) * sizeof *f->field);
     for (int k = e->kernel.n_node; k < e->n_look; k++)
         for (int d = 0; d < D; d++)

@@ -123,6 +123,7 @@ silt_status silt_coupling_freed(silt_coupling *c, bool out, silt_store *store, s
     for (int i = 0; i < n && status == SILT_OK; i++)
         c->body[i].freed = freed[i];
     free(freed);
+    silt_coupling_held(c);
     return status;
 }
 
@@ -135,5 +136,14 @@ void silt_coupling_guided(silt_coupling *c) {
         const silt_release_def *release = &c->scene->body[i].release;
         if (release->on && (body->freed || body->release <= told->n_step))
             c->body[i].freed = true;
+    }
+    silt_coupling_held(c);
+}
+
+void silt_coupling_held(silt_coupling *c) {
+    for (int i = 0; i < c->bodies->count; i++) {
+        const silt_body_def *def = &c->scene->body[i];
+        const bool all = def->motion != MOTION_FREE || (def->release.on && !c->body[i].freed);
+        c->bodies->body[i].held = all ? HELD_ALL : def->held;
     }
 }

@@ -1,7 +1,7 @@
 // kernel.c: the porosity kernel: its numbers, and what it does to fields
 #include "kernel.h"
 
-enum { SMOOTH_FIELDS = 4 }; // that go through a solve at least
+enum { SMOOTH_FIELDS = 4, LAYER_FIELDS = NESTED_FIELDS }; // that go through a solve at least; at most
 
 // the nodes of the kernel, and the cells that touch one
 static void kernel_choose(silt_kernel *kernel, const silt_mesh *mesh, const uint8_t *chosen) {
@@ -59,8 +59,41 @@ static silt_status kernel_measure(silt_kernel *kernel, const silt_mesh *mesh, co
 
 // ---------------------------------------------------------------- layers
 
+// Share of a sphere of this diameter that a hat holds whose top is k widths off its centre, by slices; all of them make 1
+static void kernel_slices(silt_kernel *kernel, double width, double diameter) {
+    enum { PARTS = 32 };
+    const double radius = 0.5 * diameter / width; // in widths
+    kernel->reach = (int)ceil(radius);
+    SILT_RESERVE(kernel->slice, kernel->layer_capacity[4], kernel->reach + 1);
+    memset(kernel->slice, 0, (size_t)(kernel->reach + 1) * sizeof *kernel->slice);
+    double sum = 0.0;
+    for (int i = 0; i < PARTS * kernel->reach; i++) {
+        const double z = (i + 0.5) / PARTS, area = silt_max(radius * radius - z * z, 0.0);
+        const int k = (int)z;
+        // those above the centre, and as many below
+        kernel->slice[k] += (k == 0 ? 2.0 : 1.0) * area * (k + 1 - z);
+        kernel->slice[k + 1] += area * (z - k);
+        sum += 2.0 * area;
+    }
+    for (int k = 0; k <= kernel->reach && sum > 0.0; k++)
+        kernel->slice[k] /= sum;
+    if (!(sum > 0.0))
+        kernel->slice[0] = 1.0;
+}
+
+// what the hats around hold, by their share of a sphere at each: n_field numbers each
+static void kernel_smear(const silt_kernel *kernel, int n_field, const double *from, double *to) {
+    for (int j = 0; j < kernel->n_layer; j++)
+        for (int f = 0; f < n_field; f++) {
+            double sum = 0.0;
+            for (int k = j > kernel->reach ? j - kernel->reach : 0; k <= j + kernel->reach && k < kernel->n_layer; k++)
+                sum += kernel->slice[abs(k - j)] * from[n_field * k + f];
+            to[n_field * j + f] = sum;
+        }
+}
+
 // hats over the heights of the kernel's nodes, at multiples of their width: the same ones whatever nodes there are
-static void kernel_layers(silt_kernel *kernel, const double *x, double width) {
+static void kernel_layers(silt_kernel *kernel, const double *x, double width, double diameter) {
     const int n = kernel->n_node, D = kernel->dim, up = D - 1;
     double low = HUGE_VAL, high = -HUGE_VAL;
     for (int k = 0; k < n; k++) {
@@ -68,36 +101,61 @@ static void kernel_layers(silt_kernel *kernel, const double *x, double width) {
         high = silt_max(high, x[D * kernel->node[k] + up]);
     }
     const double first = n > 0 ? floor(low / width) : 0.0;
+    kernel->first = first;
+    kernel->width = width;
     kernel->n_layer = n > 0 ? (int)(floor(high / width) - first) + 2 : 1;
+    kernel_slices(kernel, width, diameter);
     SILT_RESERVE(kernel->layer, kernel->layer_capacity[0], n + 1);
     SILT_RESERVE(kernel->above, kernel->layer_capacity[1], n + 1);
     SILT_RESERVE(kernel->hat, kernel->layer_capacity[2], kernel->n_layer);
-    SILT_RESERVE(kernel->sum, kernel->layer_capacity[3], kernel->n_layer);
-    memset(kernel->hat, 0, (size_t)kernel->n_layer * sizeof *kernel->hat);
+    SILT_RESERVE(kernel->sum, kernel->layer_capacity[3], 2 * LAYER_FIELDS * kernel->n_layer);
+    memset(kernel->sum, 0, (size_t)kernel->n_layer * sizeof *kernel->sum);
     for (int k = 0; k < n; k++) {
-        const double y = x[D * kernel->node[k] + up] / width - first, volume = kernel->volume[kernel->node[k]];
-        kernel->layer[k] = (int)y;
-        kernel->above[k] = y - (int)y;
-        kernel->hat[(int)y] += (1.0 - kernel->above[k]) * volume;
-        kernel->hat[(int)y + 1] += kernel->above[k] * volume;
+        const double volume = kernel->volume[kernel->node[k]];
+        kernel->layer[k] = silt_kernel_layer(kernel, x[D * kernel->node[k] + up], &kernel->above[k]);
+        kernel->sum[kernel->layer[k]] += (1.0 - kernel->above[k]) * volume;
+        kernel->sum[kernel->layer[k] + 1] += kernel->above[k] * volume;
     }
+    kernel_smear(kernel, 1, kernel->sum, kernel->hat);
 }
 
-static void kernel_layers_solve(const silt_kernel *kernel, int n_field, double *field) {
-    for (int f = 0; f < n_field; f++) {
-        memset(kernel->sum, 0, (size_t)kernel->n_layer * sizeof *kernel->sum);
-        for (int k = 0; k < kernel->n_node; k++) {
+int silt_kernel_layer(const silt_kernel *kernel, double height, double *above) {
+    const double y = silt_clamp(height / kernel->width - kernel->first, 0.0, kernel->n_layer - 1.0);
+    const int layer = (int)y < kernel->n_layer - 2 ? (int)y : kernel->n_layer - 2;
+    *above = y - layer;
+    return layer;
+}
+
+static void kernel_divide(const silt_kernel *kernel, int n_field, double *field) {
+    for (int j = 0; j < kernel->n_layer; j++)
+        for (int f = 0; f < n_field; f++)
+            field[n_field * j + f] = kernel->hat[j] > 0.0 ? field[n_field * j + f] / kernel->hat[j] : 0.0;
+}
+
+// from the nodes to the hats: means of the water that a sphere there fills
+static void kernel_layers_sample(const silt_kernel *kernel, int n_field, double *field) {
+    double *sum = kernel->sum;
+    memset(sum, 0, (size_t)(n_field * kernel->n_layer) * sizeof *sum);
+    for (int k = 0; k < kernel->n_node; k++)
+        for (int f = 0; f < n_field; f++) {
             const double value = field[n_field * k + f], up = kernel->above[k];
-            kernel->sum[kernel->layer[k]] += (1.0 - up) * value;
-            kernel->sum[kernel->layer[k] + 1] += up * value;
+            sum[n_field * kernel->layer[k] + f] += (1.0 - up) * value;
+            sum[n_field * (kernel->layer[k] + 1) + f] += up * value;
         }
-        for (int m = 0; m < kernel->n_layer; m++)
-            kernel->sum[m] = kernel->hat[m] > 0.0 ? kernel->sum[m] / kernel->hat[m] : 0.0;
-        for (int k = 0; k < kernel->n_node; k++) {
-            const double *sum = kernel->sum + kernel->layer[k];
-            field[n_field * k + f] = sum[0] + kernel->above[k] * (sum[1] - sum[0]);
+    kernel_smear(kernel, n_field, sum, field);
+    kernel_divide(kernel, n_field, field);
+}
+
+// the transpose: from the hats to the nodes
+static void kernel_layers_spread(const silt_kernel *kernel, int n_field, double *field) {
+    double *sum = kernel->sum;
+    kernel_divide(kernel, n_field, field);
+    kernel_smear(kernel, n_field, field, sum);
+    for (int k = 0; k < kernel->n_node; k++)
+        for (int f = 0; f < n_field; f++) {
+            const double *at = sum + n_field * kernel->layer[k] + f;
+            field[n_field * k + f] = at[0] + kernel->above[k] * (at[n_field] - at[0]);
         }
-    }
 }
 
 // ---------------------------------------------------------------- all kinds
@@ -110,14 +168,15 @@ static void kernel_places(silt_kernel *kernel, int n_node) {
 }
 
 silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const double *x, const uint8_t *chosen,
-                              double width, bool layers, silt_error *err) {
+                              double width, double layer_grain, silt_error *err) {
+    const bool layers = layer_grain > 0.0;
     kernel->dim = mesh->dim == 3 ? 3 : 2;
     kernel->n_layer = 0;
     kernel_choose(kernel, mesh, chosen);
     SILT_TRY(kernel_measure(kernel, mesh, x, width, layers, err));
     if (layers) {
         kernel_places(kernel, mesh->n_node);
-        kernel_layers(kernel, x, width);
+        kernel_layers(kernel, x, width, layer_grain);
         return SILT_OK;
     }
     if (kernel->dim == 3) {
@@ -142,13 +201,27 @@ silt_status silt_kernel_build(silt_kernel *kernel, const silt_mesh *mesh, const 
 }
 
 void silt_kernel_solve(const silt_kernel *kernel, int n_field, double *field) {
-    if (kernel->n_layer > 0)
-        kernel_layers_solve(kernel, n_field, field);
-    else if (kernel->dim == 3)
+    if (kernel->dim == 3)
         silt_sweep_solve(&kernel->sweep, n_field, field);
     else
         silt_nested_solve(kernel->nested, n_field, field);
 }
+
+void silt_kernel_sample(const silt_kernel *kernel, int n_field, double *field) {
+    if (kernel->n_layer > 0)
+        kernel_layers_sample(kernel, n_field, field);
+    else
+        silt_kernel_solve(kernel, n_field, field);
+}
+
+void silt_kernel_spread(const silt_kernel *kernel, int n_field, double *field) {
+    if (kernel->n_layer > 0)
+        kernel_layers_spread(kernel, n_field, field);
+    else
+        silt_kernel_solve(kernel, n_field, field);
+}
+
+int silt_kernel_rows(const silt_kernel *kernel) { return kernel->n_node > kernel->n_layer ? kernel->n_node : kernel->n_layer; }
 
 void silt_kernel_smooth(silt_kernel *kernel, double *field) {
     const int n = kernel->n_node;
@@ -166,7 +239,7 @@ void silt_kernel_clear(silt_kernel *kernel) {
     silt_sweep_clear(&kernel->sweep);
     void *owned[] = {kernel->volume, kernel->area,  kernel->edge, kernel->diagonal,
                      kernel->node,   kernel->place, kernel->near, kernel->work,
-                     kernel->layer, kernel->above, kernel->hat,  kernel->sum};
+                     kernel->layer, kernel->above, kernel->hat,  kernel->sum, kernel->slice};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
     *kernel = (silt_kernel){0};

@@ -2,6 +2,7 @@
 // way: adds springs, takes out what is held, and sets velocities so that a path is met.
 #define _GNU_SOURCE
 #include "motion.h"
+#include "response.h"
 
 #include <dlfcn.h>
 #include <math.h>
@@ -26,7 +27,8 @@ static struct {
     void *bodies;        // LIGGGHTS' store of them
     motion_pose *pose;   // owned, one per guided body
     double (*arm)[3];    // owned, one per tie: in the axes of its body
-    int n_pose, n_arm;
+    double (*pull)[6];   // owned, one per body: force and torque of its ties
+    int n_pose, n_arm, n_pull, n_body;
 } motion;
 
 #define MOTION_EXPORT __attribute__((visibility("default")))
@@ -96,6 +98,7 @@ void motion_begin(dem_guide *guide, const dem_shared *shared) {
     motion.guide = guide;
     motion.step = shared->step;
     motion.dim = shared->dim;
+    motion.n_body = shared->n_body;
     motion.substep = motion.running = 0;
     if (!guide || !motion.bodies)
         return;
@@ -103,7 +106,9 @@ void motion_begin(dem_guide *guide, const dem_shared *shared) {
         motion.pose = realloc(motion.pose, (size_t)(motion.n_pose = guide->n_body) * sizeof *motion.pose);
     if (guide->n_tie > motion.n_arm)
         motion.arm = realloc(motion.arm, (size_t)(motion.n_arm = guide->n_tie) * sizeof *motion.arm);
-    if ((guide->n_body && !motion.pose) || (guide->n_tie && !motion.arm))
+    if (guide->n_tie && motion.n_body > motion.n_pull)
+        motion.pull = realloc(motion.pull, (size_t)(motion.n_pull = motion.n_body) * sizeof *motion.pull);
+    if ((guide->n_body && !motion.pose) || (guide->n_tie && (!motion.arm || !motion.pull)))
         abort();
     for (int k = 0; k < guide->n_body; k++) {
         motion_body b;
@@ -141,7 +146,7 @@ static void motion_set_spin(const motion_body *b, const double *omega) {
             b->momentum[d] += b->inertia[c] * motion_dot(omega, b->axis[c]) * b->axis[c][d];
 }
 
-static void motion_pull(const dem_tie *tie, const double *local, const motion_body *b) {
+static void motion_pull(const dem_tie *tie, const double *local, const motion_body *b, double sum[6]) {
     double arm[3] = {0, 0, 0}, way[3], omega[3], speed[3], force[3], torque[3];
     for (int c = 0; c < 3; c++)
         for (int d = 0; d < motion.dim; d++)
@@ -164,9 +169,28 @@ static void motion_pull(const dem_tie *tie, const double *local, const motion_bo
         force[d] = -pull * way[d] / length;
     motion_cross(arm, force, torque);
     for (int d = 0; d < 3; d++) {
-        b->force[d] += force[d];
-        b->torque[d] += torque[d];
+        sum[d] += force[d];
+        sum[3 + d] += torque[d];
     }
+}
+
+// all ties, with what the water answers to them
+static void motion_ties(const dem_guide *guide) {
+    motion_body b;
+    if (!guide->n_tie)
+        return;
+    memset(motion.pull, 0, (size_t)motion.n_body * sizeof *motion.pull);
+    for (int k = 0; k < guide->n_tie; k++) {
+        const dem_tie *tie = &dem_guide_tie((dem_guide *)(uintptr_t)guide)[k];
+        if (motion_look(tie->slot, &b))
+            motion_pull(tie, motion.arm[k], &b, motion.pull[tie->slot]);
+    }
+    response_add(motion.pull[0]);
+    for (int k = 0; k < motion.n_body; k++)
+        for (int d = 0; d < 3 && motion_look(k, &b); d++) {
+            b.force[d] += motion.pull[k][d];
+            b.torque[d] += motion.pull[k][3 + d];
+        }
 }
 
 // the component of a held angle: in the plane about z, in space all
@@ -227,9 +251,7 @@ void motion_forces(void *self, int set_up) {
     motion.substep += motion.running;
     if (!guide || !motion.bodies || motion.substep > guide->n_step)
         return;
-    for (int k = 0; k < guide->n_tie; k++)
-        if (motion_look(dem_guide_tie(guide)[k].slot, &b))
-            motion_pull(&dem_guide_tie(guide)[k], motion.arm[k], &b);
+    motion_ties(guide);
     for (int k = 0; k < guide->n_body; k++)
         if (motion_look(dem_guide_body(guide)[k].slot, &b))
             motion_guide(&dem_guide_body(guide)[k], &motion.pose[k], &b);

@@ -29,6 +29,18 @@ typedef struct coupling_grain {
     bool fixed;      // held where it is: frozen for LIGGGHTS
 } coupling_grain;
 
+/** what a run of substeps changes, as it was before: the water may refuse what came of it */
+typedef struct coupling_old {
+    bool kept;
+    int n_grain, grain_capacity;
+    coupling_grain *grain;     // owned
+    struct silt_body *body;    // owned
+    bool *freed;
+    double (*wall)[4], (*triangle)[10], (*centre)[4], (*pivot)[3]; // owned
+    double left[3];
+    int64_t left_count;
+} coupling_old;
+
 /** what grains() shows: borrowed by the caller, remade when it is stale */
 typedef struct coupling_view {
     silt_grain_state state;
@@ -98,6 +110,10 @@ struct silt_coupling {
     double *shift, *walk; // owned, m, 3 per grain; the same in LIGGGHTS' order
     double *torque;       // owned, 3 per grain, N m; NULL where the water exerts none
     silt_dem_sphere *add; // owned
+    coupling_old old;
+    bool responds;        // the running substeps answer contacts of bodies
+    double *response;     // owned, how
+    int response_capacity;
     double elapsed;       // s, of the running substeps
     double contact[3];    // N/m, of contacts on all grains, of the last substeps
     double left_mass, left_rest; // and what rounding left out of it (silt_sum)
@@ -150,6 +166,14 @@ void silt_coupling_bodies_clear(silt_coupling *coupling);
 silt_status silt_coupling_send_bodies(silt_coupling *coupling, silt_error *err);
 /** distance from a point to body i; beyond `far` only a lower bound of it */
 double silt_coupling_body_distance(const silt_coupling *coupling, int i, const double *x, double far);
+// answer.c
+/** see silt_coupling_type */
+void silt_coupling_respond(silt_coupling *coupling, int size, const double *matrix);
+/** The bodies' state after a run, and the forces of water and contacts on them in it. */
+void silt_coupling_bodies_receive(silt_coupling *coupling, const silt_dem_state *state);
+void silt_coupling_keep_old(silt_coupling *coupling);   /**< before a run that may be taken back */
+void silt_coupling_take_old(silt_coupling *coupling);   /**< takes it back, if it was kept, but for LIGGGHTS */
+void silt_coupling_forget_old(silt_coupling *coupling);
 // walls.c
 void silt_coupling_walls(silt_coupling *coupling);       /**< which of them move, and where all are */
 void silt_coupling_walls_stand(silt_coupling *coupling); /**< where the walls are now is where LIGGGHTS has them */
@@ -166,6 +190,8 @@ void silt_coupling_wall_rates(silt_coupling *coupling, int m, int n, double (*ra
 void silt_coupling_guide(silt_coupling *coupling, int n);
 /** after the run: who was set free */
 void silt_coupling_guided(silt_coupling *coupling);
+/** writes silt_body.held */
+void silt_coupling_held(silt_coupling *coupling);
 /** to and from a checkpoint: who was */
 silt_status silt_coupling_freed(silt_coupling *coupling, bool out, silt_store *store, silt_error *err);
 /** where the path of a prescribed body has it at a time: x, y, z in m, angle in radians */

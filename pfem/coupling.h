@@ -46,6 +46,9 @@ typedef struct silt_coupling_type {
      * forces on bodies: force and torque in bodies()->body[] were set by the run. */
     void (*load)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, double dt);
 
+    /** Before start: in every substep R C is added to the forces and torques C of contacts on free bodies, 6 numbers a body; size
+     * rows and columns. bodies()->body[].force and torque then tell what the water exerted in all. */
+    void (*respond)(silt_coupling *coupling, int size, const double *matrix);
     /** After load: a step of the random walk of suspended grains, if the scene asks for it. viscosity: per cell of the water, Pa s,
      * with its eddies; step: counts the steps of the run. Grains are where they go at the next start. */
     void (*walk)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, const double *viscosity, double dt, int64_t step);

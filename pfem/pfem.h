@@ -387,6 +387,7 @@ typedef struct silt_body_state {
         double x[3], v[3], q[4], w[3]; // centroid, velocity, orientation (w, x, y, z), angular velocity
         double force[3], torque[3];    // of the water, N and N m per m of width, last step
         double contact[3];             // of contacts, mean of the last step
+        int held;                      // HELD_ bits: components of the motion that no force changes now (held, prescribed, not yet released)
         double mass;                   // kg
         double inertia[6];             // kg m2 about the centroid in the body's frame: xx, yy, zz, xy, xz, yz; in 2-D zz alone counts
         double volume;                 // m3; 2-D: m2
@@ -438,6 +439,7 @@ typedef struct silt_ledger {
     double volume_refined; // nodes added and removed, cumulative
     double volume_given;   // debts paid, cumulative
     double volume_owed;    // debts of wet nodes that are still to be paid
+    double owed_energy;    // J, kinetic and potential, that these debts have with their nodes
     double y_plus;         // distance of the wall law's sample in wall units, mean by length or area of its facets; NaN: none
     double angular_momentum[3]; // kg m/s times m, of the water about the origin; in 2-D the last only
     // the larger of two, of the last step's solve: force on the water that its inertia does not answer, relative to weight and

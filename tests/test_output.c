@@ -269,7 +269,7 @@ static void test_gauges(void **state) {
 #define WATER                                                                                                          \
     "step,time,dt,n_node,n_cell,fluid_volume,flying_volume,mesh_volume,fluid_mass,volume_error,kinetic_energy,"        \
     "potential_energy,momentum_x,momentum_y,momentum_z,momentum_error,external_work,dissipation,max_speed,volume_solved,"        \
-    "volume_moved,volume_reconnected,volume_refined,volume_given,volume_owed,angular_momentum_x,"                      \
+    "volume_moved,volume_reconnected,volume_refined,volume_given,volume_owed,owed_energy,angular_momentum_x,"                      \
     "angular_momentum_y,angular_momentum_z,"
 #define GRAIN_FORCES                                                                                                   \
     "grain_velocity_x,grain_velocity_y,grain_velocity_z,grain_kinetic_energy,grain_potential_energy,grain_water_x,grain_water_y,grain_water_z,grain_contact_x,"    \

@@ -168,8 +168,10 @@ static void test_random(void **state) {
     ", \"worst_volume_error\": " volume ", \"worst_sediment_error\": 0,\n" \
     "\"checks\": [{\"name\": \"way\", \"value\": 0.11, \"error\": 0.1, \"pass\": false}, {\"name\": \"b\", \"value\": null, \"error\": null, \"pass\": false}]}"
 #define HEADER "step,time,dt,kinetic_energy,potential_energy,external_work,centre_x\n"
+#define OWED_HEADER "step,time,dt,fluid_volume,volume_error,volume_owed,kinetic_energy,potential_energy,owed_energy,external_work\n"
 
 static study_row judged(study *s, const char *summary, const char *history, const char *said, study_end end) {
+    make("run.log", *said == '!' ? said + 1 : "");
     static const char gauge[] = "silt: 1\ntime: {end: 1, output: 1}\ngravity: [0, -10]\n"
                                 "fluid: {density: 1000, viscosity: 0, flow: laminar, size: 0.1, regions: [{box: [[0, 0], [1, 2]]}]}\n"
                                 "gauges: [{name: centre, centroid_of: water}]\n";
@@ -188,7 +190,7 @@ static study_row judged(study *s, const char *summary, const char *history, cons
 }
 
 static void ends(const char *summary, const char *history, const char *said, study_end end, study_status status, const char *reason) {
-    study s = {.bounds = {.volume = 0.01, .sediment = 1e-9, .energy = 0.01}};
+    study s = {.bounds = {.volume = 0.01, .mass = 1e-3, .sediment = 1e-9, .energy = 0.01}};
     study_row row = judged(&s, summary, history, said, end);
     if (study_row_status(&row) != status || !strstr(study_row_text(&row, "reason"), reason))
         fail_msg("%s: %s; expected %s: %s", study_row_text(&row, "status"), study_row_text(&row, "reason"), study_status_word[status], reason);
@@ -202,6 +204,9 @@ static void test_statuses(void **state) {
     ends(SUMMARY("0", "1e-3"), sound, "", good, RUN_OK, "");
     ends(SUMMARY("3", "1e-3"), sound, "", good, RUN_CUT, "3 steps cut");
     ends(SUMMARY("0", "0.011"), sound, "", good, RUN_WRONG, "volume error 0.011, allowed 0.01");
+    // of what the run itself told it was warned, and that alone
+    ends(SUMMARY("2", "0.3"), sound, "!frame 1\nwarning: t = 1 s: the water's volume is off", good, RUN_WARNED, "warning: t = 1 s: the water's volume");
+    ends(SUMMARY("2", "0.3"), sound, "!warning: t = 1 s: the shear", good, RUN_WRONG, "volume error 0.3");
     ends(SUMMARY("0", "null"), sound, "", good, RUN_WRONG, "volume error nan");
     ends(NULL, sound, "warning: a\nscene.yaml:1:2: key 'a': found", (study_end){.code = SILT_INPUT}, RUN_REFUSED, "scene.yaml:1:2: key 'a'");
     ends(SUMMARY("0", "1e-3"), sound, "step 3 gave up\nthe last checkpoint", (study_end){.code = SILT_FAILED}, RUN_FAILED, "step 3 gave up");
@@ -220,7 +225,7 @@ static void test_statuses(void **state) {
 // 2 m3 of water that stands 2 m high in g = 10 m/s2 can give up 20 kJ/m; 5 J of motion, 100 J of work
 static void test_energy(void **state) {
     (void)state;
-    study s = {.bounds = {.volume = 0.01, .sediment = 1e-9, .energy = 0.01}};
+    study s = {.bounds = {.volume = 0.01, .mass = 1e-3, .sediment = 1e-9, .energy = 0.01}};
     const study_end good = {.cpu = 1};
     study_row row = judged(&s, SUMMARY("0", "0"), HEADER "0,0,0,0,0,0,1\n1,0.2,0.2,400,-90,100,1\n2,0.5,0.3,0,-90,100,1\n", "", good);
     near(study_row_number(&row, "energy_excess"), 210 / (20000.0 + 400 + 90 + 100), 1e-5, "excess");
@@ -231,6 +236,19 @@ static void test_energy(void **state) {
     row = judged(&s, SUMMARY("0", "0"), HEADER "0,0,0,0,0,0,1\n1,0.2,0.2,400,-90,310,1\n", "", good);
     near(study_row_number(&row, "energy_excess"), 0, 0, "excess");
     assert_int_equal(study_row_status(&row), RUN_OK);
+    study_row_clear(&row);
+    // 0.1 m3 of 2 are owed with 300 J of 500: neither is lost
+    row = judged(&s, SUMMARY("0", "5e-3"), OWED_HEADER "0,0,0,2,0,0,0,500,0,0\n1,0.2,0.2,1.9,-0.05,0.1,0,200,300,0\n", "", good);
+    near(study_row_number(&row, "energy_excess"), 0, 0, "excess");
+    near(study_row_number(&row, "mass_error"), 0, 1e-15, "mass");
+    assert_int_equal(study_row_status(&row), RUN_OK);
+    study_row_clear(&row);
+    // 0.0025 of it is
+    row = judged(&s, SUMMARY("0", "5e-3"), OWED_HEADER "0,0,0,2,0,0,0,500,0,0\n1,0.2,0.2,1.9,-0.05,0.095,0,200,300,0\n", "", good);
+    near(study_row_number(&row, "mass_error"), 0.0025, 1e-12, "mass");
+    assert_int_equal(study_row_status(&row), RUN_WRONG);
+    study_row_clear(&row);
+    row = judged(&s, SUMMARY("0", "0"), HEADER "0,0,0,0,0,0,1\n1,0.2,0.2,400,-90,310,1\n", "", good);
     // cells of the row
     near(study_row_number(&row, "nodes"), 12, 0, "nodes");
     near(study_row_number(&row, "mean_dt"), 0.25, 0, "mean dt");

@@ -45,6 +45,7 @@ static const history_column history_ledger[] = {
     {"volume_refined", PART_FLUID, offsetof(silt_ledger, volume_refined), false},
     {"volume_given", PART_FLUID, offsetof(silt_ledger, volume_given), false},
     {"volume_owed", PART_FLUID, offsetof(silt_ledger, volume_owed), false},
+    {"owed_energy", PART_FLUID, offsetof(silt_ledger, owed_energy), false},
     {"y_plus", PART_LAW, offsetof(silt_ledger, y_plus), false},
     {"angular_momentum_x", PART_FLUID, offsetof(silt_ledger, angular_momentum[0]), false},
     {"angular_momentum_y", PART_FLUID, offsetof(silt_ledger, angular_momentum[1]), false},

@@ -108,6 +108,22 @@ char *silt_worker_find(const char *asked) {
     return worker_near(self);
 }
 
+void silt_run_warn(const silt_run *run, const char *format, ...) {
+    char text[512], *path = silt_text("%s/run.log", run->out);
+    va_list list;
+    va_start(list, format);
+    vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    FILE *log = fopen(path, "a");
+    if (!run->def.quiet)
+        fprintf(stderr, "warning: t = %.6g s: %s\n", run->time, text);
+    if (log) {
+        fprintf(log, "warning: t = %.6g s: %s\n", run->time, text);
+        fclose(log);
+    }
+    free(path);
+}
+
 void silt_folder_remove(const char *path) {
     DIR *folder = opendir(path);
     for (struct dirent *entry; folder && (entry = readdir(folder));)

@@ -83,9 +83,14 @@ void silt_run_ledger(silt_run *run) {
         ledger->fluid_volume -= run->waiting[k].mass / scene->bed.density;
     ledger->fluid_volume += ledger->flying_volume;
     ledger->fluid_mass = rho * ledger->fluid_volume;
-    ledger->volume_owed = 0;
-    for (int i = 0; i < nodes->count; i++)
-        ledger->volume_owed += run->mesh.wet[i] ? nodes->debt[i] : 0;
+    ledger->volume_owed = ledger->owed_energy = 0;
+    for (int i = 0; i < nodes->count; i++) {
+        if (!run->mesh.wet[i] || nodes->debt[i] == 0)
+            continue;
+        const double *v = nodes->v + D * i;
+        ledger->volume_owed += nodes->debt[i];
+        ledger->owed_energy += rho * nodes->debt[i] * (0.5 * silt_dot(D, v, v) - silt_dot(D, nodes->x + D * i, scene->gravity));
+    }
     if (scene->fluid.on)
         silt_water_moment(nodes, &run->mesh, run->drag ? run->drag->solid : NULL, rho, (const double[3]){0}, ledger->angular_momentum);
     ledger->y_plus = run->fluid.law.n_point ? run->fluid.law.y_plus[1] : NAN;
@@ -157,6 +162,7 @@ void silt_run_balance(silt_run *run) {
     ledger->momentum_error = fluid->momentum_scale > 0 ? fluid->momentum_residual / fluid->momentum_scale : 0;
     if (!run->coupling)
         return;
+    ledger->momentum_error = silt_max(ledger->momentum_error, run->body_error);
     silt_exchanged exchanged;
     silt_coupling_dem.exchanged(run->coupling, &exchanged);
     double open[3] = {0};

@@ -98,6 +98,13 @@ double silt_run_pace(const silt_run *run) {
         least = silt_min(least, silt_tension_time(scene->fluid.surface_tension, scene->fluid.density, h));
     }
     least = silt_min(least, walls_time(run));
+    // nodes of an inlet take its speed with the step
+    for (int k = 0; k < scene->fluid.n_inlet; k++) {
+        const silt_inlet *inlet = &scene->fluid.inlet[k];
+        const double factor = inlet->series.n_row ? silt_series_at(&inlet->series, 1, run->time) : 1, speed = fabs(factor) * silt_length(3, inlet->velocity);
+        if (speed > 0)
+            least = silt_min(least, scene->fluid.size / speed);
+    }
     // water at rest meets a belt or a lid
     for (int k = 0; k < scene->n_wall; k++) {
         const double speed = silt_length(3, scene->wall[k].velocity);

@@ -4,6 +4,7 @@
 #include "bed_law.h"
 #include "run.h"
 
+#define VOLUME_OFF 0.05    // largest share of the water that may be off without a word
 #define BED_Y_PLUS 5.0     // largest height of the first cell in wall units: the viscous sublayer
 #define PRESSURE_SLOPE 0.2 // largest share by which output carries the pressure on to the end of the step
 
@@ -118,6 +119,29 @@ static void water_restore(silt_run *run) {
     silt_stiff_forget(run->fluid.stiff);
 }
 
+static silt_step water_see(silt_run *run) {
+    const silt_scene *scene = run->scene;
+    silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
+                      .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
+                      .seep = silt_seep_on(scene) ? &run->seep : NULL,
+                      .nodes = &run->nodes, .time = run->time, .dt = run->dt};
+    if (silt_run_bodies_free(run)) {
+        step.body_velocity = run->body_velocity;
+        step.body_shift = run->body_shift;
+    }
+    step.gap_force = run->gaps ? run->gap_force : NULL;
+    return step;
+}
+
+static silt_status water_gave_up(const silt_run *run, int tries, silt_error *err) {
+    char why[sizeof err->text];
+    snprintf(why, sizeof why, "%s", err ? err->text : "");
+    if (err)
+        *err = (silt_error){0};
+    return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s gave up after %d tries, the last with dt = %.3g s: %s",
+                     (long long)run->step + 1, run->time, tries, run->dt, why);
+}
+
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
     const silt_scene *scene = run->scene;
     water_keep(run);
@@ -134,30 +158,23 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
             return status;
         }
         run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
-        const silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
-                                .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
-                                .seep = silt_seep_on(scene) ? &run->seep : NULL,
-                                .nodes = &run->nodes, .time = run->time, .dt = run->dt};
+        if (scene->n_body)
+            silt_run_bodies_coast(run);
+        const silt_step step = water_see(run);
         silt_clock_to(CLOCK_assemble);
         status = silt_fluid_step(&run->fluid, &step, err);
         silt_clock_to(CLOCK_rest);
-        if (status == SILT_OK)
-            status = silt_run_loads_sane(run, err);
+        if (status == SILT_OK && scene->n_body)
+            SILT_CLOCKED(coupling, status = silt_run_bodies_load(run, &step, err));
         if (status == SILT_OK) {
-            if (silt_seep_on(scene))
+            if (silt_seep_on(scene) && !silt_run_bodies_free(run))
                 silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
             return SILT_OK;
         }
         water_restore(run);
         const bool least = run->coupling && *n <= 1;
-        if (attempt >= scene->time.retries || least) {
-            char why[sizeof err->text];
-            snprintf(why, sizeof why, "%s", err ? err->text : "");
-            if (err)
-                *err = (silt_error){0};
-            return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s gave up after %d tries, the last with dt = %.3g s: %s",
-                             (long long)run->step + 1, run->time, attempt + 1, run->dt, why);
-        }
+        if (attempt >= scene->time.retries || least)
+            return water_gave_up(run, attempt + 1, err);
         if (err)
             *err = (silt_error){0};
         run->summary.retries++;
@@ -218,16 +235,8 @@ static void bed_resolved(silt_run *run) {
     if (run->bed_told || run->bed.y_plus <= BED_Y_PLUS)
         return;
     run->bed_told = true;
-    char *path = silt_text("%s/run.log", run->out);
-    FILE *log = fopen(path, "a");
-    for (int k = 0; k < 2; k++)
-        if (k == 0 ? !run->def.quiet : log != NULL)
-            fprintf(k == 0 ? stderr : log, "warning: t = %.6g s: the first cell over the bed is %.3g wall units high (y+), the gradient of bed.shear "
-                                           "needs at most %g: the shear is too low; finer water at the bed, or bed.shear: log-law\n",
-                    run->time, run->bed.y_plus, BED_Y_PLUS);
-    if (log)
-        fclose(log);
-    free(path);
+    silt_run_warn(run, "the first cell over the bed is %.3g wall units high (y+), the gradient of bed.shear needs at most %g: the shear is "
+                       "too low; finer water at the bed, or bed.shear: log-law", run->bed.y_plus, BED_Y_PLUS);
 }
 
 static void bed_step(silt_run *run) {
@@ -295,13 +304,22 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         SILT_CLOCKED(coupling, {
             if (attempt == 0)
                 silt_run_place(run);
-            status = silt_run_grains(run, (int)n, before, attempt > 0, err);
+            status = silt_run_grains(run, (int)n, attempt > 0, err);
         });
+        const bool moved = status == SILT_OK;
+        if (moved && scene->fluid.on && silt_run_bodies_free(run)) {
+            const silt_step step = water_see(run);
+            silt_clock_to(CLOCK_assemble);
+            status = silt_run_bodies_answer(run, &step, err);
+            silt_clock_to(CLOCK_rest);
+        }
         if (status == SILT_OK)
             break;
         if (!grains_again(run, &n, attempt, err))
-            return silt_run_grains_failed(run, status, err);
+            return moved ? water_gave_up(run, attempt + 1, err) : silt_run_grains_failed(run, status, err);
     }
+    if (scene->fluid.on && silt_run_bodies_free(run) && silt_seep_on(scene))
+        silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
     if (run->coupling && scene->bed.on)
         SILT_CLOCKED(bed, status = silt_run_deposit(run, err));
     SILT_TRY(status);
@@ -348,6 +366,16 @@ silt_status silt_run_measure(silt_run *run, silt_error *err) {
     return SILT_OK;
 }
 
+// water that is owed is not lost, but where there is so much of it the cells are too large for what it does: told once a run
+static void volume_held(silt_run *run) {
+    const silt_ledger *ledger = &run->ledger;
+    if (run->volume_told || !run->scene->fluid.on || !(fabs(ledger->volume_error) > VOLUME_OFF))
+        return;
+    run->volume_told = true;
+    silt_run_warn(run, "the water's volume is off by %.3g %%, %.3g m3 of it are owed and come back later: the cells are too large for what the water "
+                       "does there; smaller fluid.size", 100 * ledger->volume_error, ledger->volume_owed);
+}
+
 silt_status silt_run_output(silt_run *run, silt_error *err) {
     // a row cannot hold the time that writing it takes: it shows that of the row before
     run_phases(run);
@@ -377,6 +405,7 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
 silt_status silt_run_advance(silt_run *run, silt_error *err) {
     SILT_TRY(run_step(run, err));
     SILT_TRY(silt_run_measure(run, err));
+    volume_held(run);
     return silt_run_output(run, err);
 }
 
@@ -409,7 +438,12 @@ void silt_run_free(silt_run *run) {
     free(run->grown);
     free(run->grown_area);
     free(run->body_before);
-    free(run->body_load);
+    free(run->body_after);
+    free(run->body_velocity);
+    free(run->body_shift);
+    free(run->body_carry);
+    silt_uplift_free(&run->uplift);
+    free(run->gap_force);
     free(run->x_old);
     free(run->p_old);
     free(run->p_shown);

@@ -2,6 +2,8 @@
 #include "run.h"
 #include "solid.h"
 
+#define WATER_MADE 0.1 // largest share by which the first cells may miss the regions without a word
+
 static bool run_solid(const void *context, const double *x, double margin) {
     const silt_barrier *barrier = context;
     if (barrier->bed && (silt_bed_contains(barrier->bed, x) || silt_bed_near(barrier->bed, x, margin)))
@@ -138,6 +140,48 @@ void silt_run_locate(silt_run *run) {
         silt_locator_build(&run->locator, &run->mesh, run->nodes.x, run->scene->fluid.size);
 }
 
+// some node lies on no facet of the boundary
+static bool water_deep(const silt_mesh *mesh) {
+    const int D = mesh->dim == 3 ? 3 : 2;
+    uint8_t *rim = silt_alloc((size_t)mesh->n_node + 1, sizeof *rim);
+    bool deep = false;
+    for (int f = 0; f < mesh->n_facet; f++)
+        for (int a = 0; a < D; a++)
+            rim[mesh->facet[f][a]] = 1;
+    for (int i = 0; i < mesh->n_node && !deep; i++)
+        deep = mesh->wet[i] && !rim[i];
+    free(rim);
+    return deep;
+}
+
+// Regions and clouds too thin for any cell hold no water; those that are coarsely met are told. Where bed or bodies stand in regions, or
+// the water is a cloud, nobody knows beforehand how much there is.
+static silt_status water_there(const silt_run *run, silt_error *err) {
+    const silt_scene *scene = run->scene;
+    const silt_fluid_def *fluid = &scene->fluid;
+    if (run->mesh.n_cell == 0 && fluid->n_inlet == 0)
+        return silt_fail(err, SILT_INPUT, fluid->cloud ? "key 'fluid.cloud': found nodes of which no three make a cell of water (in space no four), allowed nodes about "
+                                                         "fluid.size = %g m apart that fill an area (a volume)"
+                                                       : "key 'fluid.regions': found water in which no cell of fluid.size = %g m has room, allowed regions that are "
+                                                         "wider than a cell; smaller fluid.size", fluid->size);
+    if (fluid->cloud)
+        return SILT_OK;
+    if (fluid->n_inlet == 0 && !water_deep(&run->mesh))
+        silt_run_warn(run, "no node lies inside of the water, whose pressure is then that of its walls and its surface alone: it is no deeper than "
+                           "fluid.size = %g m; smaller fluid.size", fluid->size);
+    if (scene->bed.on || scene->n_body)
+        return SILT_OK;
+    double wanted = 0, made = 0;
+    for (int r = 0; r < fluid->n_region; r++)
+        wanted += silt_region_area(&fluid->region[r]);
+    for (int e = 0; e < run->mesh.n_cell; e++)
+        made += silt_cell_volume(&run->mesh, run->nodes.x, e);
+    if (fabs(made - wanted) > WATER_MADE * wanted)
+        silt_run_warn(run, "the water's regions hold %.4g m%d, its cells %.4g at the start: smaller fluid.size, or regions that overlap", wanted, scene->dimension,
+                      made);
+    return SILT_OK;
+}
+
 silt_status silt_run_first(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     if (scene->bed.on)
@@ -188,6 +232,7 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
     else
         silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
     SILT_TRY(silt_mesh_first(&run->mesh, &run->nodes, scene, &run->barrier, err));
+    SILT_TRY(water_there(run, err));
     silt_size_update(run->size, &run->nodes, &run->mesh);
     SILT_TRY(silt_run_pockets(run, err));
     // nodes of the cloud that got no cell at the start are no drops: they hold no water

@@ -410,3 +410,49 @@ void silt_scene_fill(silt_reader *reader, silt_scene *scene, silt_fill_clear *cl
     free(f.grid.first);
     free(f.grid.next);
 }
+
+// ---------------------------------------------------------------- grains of the list
+
+#define FILL_OVERLAP 0.1 // share of a grain's radius that may stand in something at the start
+
+/** a grain of the list by its left end */
+typedef struct fill_end {
+    double left;
+    int grain;
+} fill_end;
+
+static int fill_end_order(const void *a, const void *b) {
+    const fill_end *p = a, *q = b;
+    return p->left != q->left ? (p->left < q->left ? -1 : 1) : p->grain - q->grain;
+}
+
+static void fill_check_pairs(silt_reader *reader, const silt_scene *scene) {
+    const int n = scene->grains.n_grain;
+    const silt_grain_def *grain = scene->grains.grain;
+    fill_end *end = silt_alloc((size_t)n + 1, sizeof *end);
+    for (int i = 0; i < n; i++)
+        end[i] = (fill_end){grain[i].at[0] - 0.5 * grain[i].diameter, i};
+    qsort(end, (size_t)n, sizeof *end, fill_end_order);
+    for (int i = 0; i < n; i++)
+        for (int k = i + 1; k < n && end[k].left < end[i].left + grain[end[i].grain].diameter; k++) {
+            const int a = end[i].grain < end[k].grain ? end[i].grain : end[k].grain, b = end[i].grain + end[k].grain - a;
+            const silt_grain_def *p = &grain[a], *q = &grain[b];
+            const double apart[3] = {p->at[0] - q->at[0], p->at[1] - q->at[1], p->at[2] - q->at[2]};
+            const double overlap = 0.5 * (p->diameter + q->diameter) - silt_length(3, apart);
+            if (overlap > 0.5 * FILL_OVERLAP * silt_min(p->diameter, q->diameter) && !(p->fixed && q->fixed))
+                silt_complain(reader, silt_tree_find(reader->root, "grains.list.%d.at", b),
+                              "key 'grains.list.%d.at': found a grain that stands %.3g m in grain %d, allowed places that are clear of the others", b, overlap, a);
+        }
+    free(end);
+}
+
+void silt_scene_check_grains(silt_reader *reader, const silt_scene *scene, silt_fill_clear *clear, const void *context) {
+    for (int i = 0; i < scene->grains.n_grain; i++) {
+        const silt_grain_def *grain = &scene->grains.grain[i];
+        if (!grain->fixed && !clear(context, grain->at, 0.5 * (1 - FILL_OVERLAP) * grain->diameter))
+            silt_complain(reader, silt_tree_find(reader->root, "grains.list.%d.at", i),
+                          "key 'grains.list.%d.at': found a grain of %.4g m that stands in a wall, the bed or a body, allowed places that are clear of them", i,
+                          grain->diameter);
+    }
+    fill_check_pairs(reader, scene);
+}

@@ -318,12 +318,14 @@ static bool check_clear_at(const void *context, const double *x, double radius) 
 
 // what all keys are sound for
 static void check_fill(silt_reader *reader, silt_scene *scene) {
-    if (reader->n_complaint > 0 || scene->grains.n_fill == 0)
+    if (reader->n_complaint > 0 || (scene->grains.n_fill == 0 && scene->grains.n_grain == 0))
         return;
     check_clear clear = {scene, silt_alloc((size_t)scene->n_body + 1, sizeof *clear.body)};
     for (int i = 0; i < scene->n_body; i++)
         clear.body[i] = silt_body_shape_make(scene, &scene->body[i]);
-    silt_scene_fill(reader, scene, check_clear_at, &clear);
+    silt_scene_check_grains(reader, scene, check_clear_at, &clear);
+    if (scene->grains.n_fill > 0)
+        silt_scene_fill(reader, scene, check_clear_at, &clear);
     for (int i = 0; i < scene->n_body; i++)
         free(clear.body[i].point);
     free(clear.body);
@@ -341,7 +343,7 @@ static const char *const check_fixed[] = {
     "step", "time", "dt", "n_node", "n_cell", "fluid_volume", "flying_volume", "mesh_volume", "fluid_mass",
     "volume_error", "kinetic_energy", "potential_energy", "momentum_x", "momentum_y", "momentum_z", "momentum_error",
     "external_work", "dissipation", "max_speed", "volume_solved", "volume_moved", "volume_reconnected",
-    "volume_refined", "volume_given", "volume_owed", "y_plus", "angular_momentum_x", "angular_momentum_y",
+    "volume_refined", "volume_given", "volume_owed", "owed_energy", "y_plus", "angular_momentum_x", "angular_momentum_y",
     "angular_momentum_z", "bed_mass", "released_mass", "deposited_mass", "pore_water_mass", "bed_shear", "bed_work",
     "bed_y_plus", "seepage", "seepage_volume", "seepage_lost", "grain_count", "grain_mass", "grain_velocity_x",
     "grain_velocity_y", "grain_velocity_z", "grain_kinetic_energy", "grain_potential_energy", "grain_water_x",

@@ -513,7 +513,7 @@ static const silt_key contact_rows[] = {
      .doc = "Young's modulus of the walls; a thousand times that of the grains is rigid"},
     {"poissons_ratio", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 0.5), AT(silt_contact_def, poissons_ratio),
      .doc = "of grains and bodies"},
-    {"restitution", KEY_NUMBER, RANGE(0.05, 1), AT(silt_contact_def, restitution), .doc = "coefficient of restitution"},
+    {"restitution", KEY_NUMBER, .flags = KEY_OPEN_LOW, RANGE(0.05, 1), AT(silt_contact_def, restitution), .doc = "coefficient of restitution"},
     {"friction", KEY_NUMBER, RANGE(0, 10), AT(silt_contact_def, friction), .doc = "coefficient of sliding friction"},
     {"rolling_friction", KEY_NUMBER, RANGE(0, 10), AT(silt_contact_def, rolling_friction),
      .doc = "coefficient of rolling friction"},

@@ -198,10 +198,12 @@ typedef struct silt_body_shape {
 silt_body_shape silt_body_shape_make(const silt_scene *scene, const silt_body_def *body);
 /** true where a circle or sphere of that radius at x meets it */
 bool silt_body_shape_near(const silt_body_shape *shape, const double *x, double radius);
-/** true where a grain of that radius at x touches no wall, bed or body */
-typedef bool silt_fill_clear(const void *context, const double *x, double radius);
 /** What moves bodies (scene_motion.c). */
 void silt_scene_check_motion(silt_reader *reader, const silt_scene *scene);
+/** true where a grain of that radius at x touches no wall, bed or body */
+typedef bool silt_fill_clear(const void *context, const double *x, double radius);
+/** Grains of the list that stand in each other, in a wall, the bed or a body: contacts would throw them apart (fill.c). Fixed ones may. */
+void silt_scene_check_grains(silt_reader *reader, const silt_scene *scene, silt_fill_clear *clear, const void *context);
 /** Fills grains.regions into grains.filled; a complaint where more is asked for than fits (fill.c). */
 void silt_scene_fill(silt_reader *reader, silt_scene *scene, silt_fill_clear *clear, const void *context);
 /** the resolved scene as YAML; owned by the caller. names: files with their folder (true), or their last part only */

@@ -87,7 +87,7 @@ typedef struct study {
     double memory; // bytes / 1e9
     struct {
         bool on;
-        double volume, sediment, energy;
+        double volume, mass, sediment, energy;
     } bounds;
     int keep; // study_keep
     study_seek seek;
@@ -111,7 +111,7 @@ void study_assign(char ***set, int *n_set, int *capacity, const char *key, const
                   const char *value);
 
 // one run -----------------------------------------------------------------------------------------------
-typedef enum { RUN_OK = 0, RUN_CUT, RUN_REFUSED, RUN_FAILED, RUN_UNFINISHED, RUN_HUNG, RUN_CRASHED, RUN_WRONG, RUN_STATUS_COUNT } study_status;
+typedef enum { RUN_OK = 0, RUN_CUT, RUN_WARNED, RUN_REFUSED, RUN_FAILED, RUN_UNFINISHED, RUN_HUNG, RUN_CRASHED, RUN_WRONG, RUN_STATUS_COUNT } study_status;
 extern const char *const study_status_word[RUN_STATUS_COUNT];
 
 /** one cell of a row; rows are lists of them, so that each run may have other columns */

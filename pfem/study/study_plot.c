@@ -7,7 +7,7 @@
 
 #include "study.h"
 
-static bool row_counts(const study_row *row) { return study_row_status(row) <= RUN_CUT; }
+static bool row_counts(const study_row *row) { return study_row_status(row) <= RUN_WARNED; }
 
 // a title as gnuplot takes it in double quotes
 static void plot_quote(FILE *to, const char *text) {
@@ -123,7 +123,7 @@ static void map_tics(FILE *to, const study *s, char axis, const char *key) {
 }
 
 static bool plot_map(const plot_files *files, const study *s, const study_plot *plot, const study_table *table, const char *x, const char *y) {
-    static const char *const colour[RUN_STATUS_COUNT] = {"#4daf4a", "#a6d96a", "#bdbdbd", "#fdae61", "#ffff66", "#d73027", "#000000", "#984ea3"};
+    static const char *const colour[RUN_STATUS_COUNT] = {"#4daf4a", "#a6d96a", "#80cdc1", "#bdbdbd", "#fdae61", "#ffff66", "#d73027", "#000000", "#984ea3"};
     FILE *data = fopen(files->data, "w");
     int found[RUN_STATUS_COUNT] = {0};
     if (!data)

@@ -6,7 +6,7 @@
 
 #define MOST_ROWS 60
 
-static const char *const report_mark[RUN_STATUS_COUNT] = {"ok", "cut", "refused", "**failed**", "**unfinished**", "**hung**", "**crashed**", "**wrong**"};
+static const char *const report_mark[RUN_STATUS_COUNT] = {"ok", "cut", "warned", "refused", "**failed**", "**unfinished**", "**hung**", "**crashed**", "**wrong**"};
 
 static void report_cell(FILE *to, const char *text) {
     for (; text && *text; text++)
@@ -24,7 +24,7 @@ static void report_counts(FILE *to, const study_table *table, int wanted) {
         const double seconds = study_row_number(row, "cpu_seconds"), v = study_row_number(row, "volume_error"), e = study_row_number(row, "energy_excess");
         count[study_row_status(row)]++;
         cpu += isnan(seconds) ? 0 : seconds;
-        if (study_row_status(row) > RUN_CUT)
+        if (study_row_status(row) > RUN_WARNED)
             continue;
         volume = v > volume ? v : volume;
         energy = e > energy ? e : energy;
@@ -80,13 +80,13 @@ static void report_map(FILE *to, const study *s, const study_table *table, int a
 }
 
 static void report_rows(FILE *to, const study *s, const study_table *table) {
-    static const char *const column[] = {"status", "steps", "time", "volume_error", "energy_excess", "reason"};
+    static const char *const column[] = {"status", "steps", "time", "volume_error", "mass_error", "energy_excess", "reason"};
     fprintf(to, "\n|");
     for (int r = 0; r < s->n_range; r++)
         fprintf(to, " %s |", s->range[r].key);
-    fprintf(to, s->seek.on ? " %s | status | steps | time | volume error | energy excess | reason |\n|" :
-                            "%s status | steps | time | volume error | energy excess | reason |\n|", s->seek.on ? s->seek.key : "");
-    for (int k = 0; k < s->n_range + 6 + s->seek.on; k++)
+    fprintf(to, s->seek.on ? " %s | status | steps | time | volume error | mass error | energy excess | reason |\n|" :
+                            "%s status | steps | time | volume error | mass error | energy excess | reason |\n|", s->seek.on ? s->seek.key : "");
+    for (int k = 0; k < s->n_range + 7 + s->seek.on; k++)
         fprintf(to, "---|");
     fputc('\n', to);
     for (int i = 0; i < table->n; i++) {
@@ -97,7 +97,7 @@ static void report_rows(FILE *to, const study *s, const study_table *table) {
             report_cell(to, study_row_text(row, r < s->n_range ? s->range[r].key : s->seek.key));
             fprintf(to, " |");
         }
-        for (int k = 0; k < 6; k++) {
+        for (int k = 0; k < 7; k++) {
             fputc(' ', to);
             report_cell(to, k == 0 ? report_mark[study_row_status(row)] : study_row_text(row, column[k]));
             fprintf(to, " |");
@@ -131,7 +131,7 @@ static void report_reasons(FILE *to, const study_table *table) {
     bool *told = silt_alloc((size_t)table->n + 1, sizeof *told), any = false;
     for (int i = 0; i < table->n; i++) {
         const study_status status = study_row_status(&table->row[i]);
-        if (told[i] || status < RUN_REFUSED)
+        if (told[i] || status < RUN_WARNED)
             continue;
         int n = 0;
         for (int k = i; k < table->n; k++)

@@ -67,13 +67,26 @@ static void __attribute__((noreturn)) child_become(const study *s, const char *l
     _exit(127);
 }
 
-// s of processor that a process has taken so far, with its threads
-static double child_cpu(pid_t child) {
+static double process_cpu(pid_t process) {
     clockid_t clock;
     struct timespec now = {0};
-    if (clock_getcpuclockid(child, &clock) != 0 || clock_gettime(clock, &now) != 0)
+    if (clock_getcpuclockid(process, &clock) != 0 || clock_gettime(clock, &now) != 0)
         return 0;
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+// s of processor that a run has taken so far, with its threads and its worker
+static double child_cpu(pid_t child) {
+    char *path = silt_text("/proc/%d/task/%d/children", (int)child, (int)child);
+    double sum = process_cpu(child);
+    int worker;
+    FILE *from = fopen(path, "r");
+    while (from && fscanf(from, "%d", &worker) == 1)
+        sum += process_cpu(worker);
+    if (from)
+        fclose(from);
+    free(path);
+    return sum;
 }
 
 // s since the run wrote a row, or since it began
@@ -130,7 +143,7 @@ static uint64_t run_hash(const study *s, int n_set, char *const *set) {
     else
         hash = silt_hash(0, err.text, strlen(err.text));
     silt_scene_free(&scene);
-    const double judged[] = {s->limit, s->memory, s->threads, s->bounds.volume, s->bounds.sediment, s->bounds.energy};
+    const double judged[] = {s->limit, s->memory, s->threads, s->bounds.volume, s->bounds.mass, s->bounds.sediment, s->bounds.energy};
     return silt_hash(hash, judged, sizeof judged);
 }
 
@@ -230,7 +243,7 @@ static silt_status search_at(job_search *search, double x, double *above, silt_e
     const silt_status status = job_run(search->s, search->def, search->out, search->k, value, name, &row, err);
     if (status == SILT_OK) {
         char *column = silt_text("%s_value", seek->check);
-        *above = study_row_status(&row) <= RUN_CUT ? study_row_number(&row, column) - seek->value : NAN;
+        *above = study_row_status(&row) <= RUN_WARNED ? study_row_number(&row, column) - seek->value : NAN;
         free(column);
     }
     study_row_clear(&row);
