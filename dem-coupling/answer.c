@@ -20,8 +20,7 @@ void silt_coupling_bodies_receive(silt_coupling *c, const silt_dem_state *state)
             b->force[k] += c->responds ? answer[k] / c->width : 0.0;
             b->torque[k] += c->responds ? answer[3 + k] / c->width : 0.0;
             const double change = b->mass * ((b->v[k] - c->body[i].old_v[k]) / c->elapsed - c->scene->gravity[k]);
-            // springs and what holds a body count with its contacts
-            b->contact[k] = c->responds && b->held == 0 && c->scene->body[i].n_spring == 0 ? contact[k] / c->width : change - b->force[k];
+            b->contact[k] = c->responds && !c->body[i].fixed ? contact[k] / c->width : change - b->force[k];
         }
     }
     c->responds = false;

@@ -48,18 +48,11 @@ struct silt_dem {
     double *body_x, *body_v, *body_omega, *body_q, *body_contact, *body_answer;
 };
 
-double silt_dem_rayleigh(double radius, double density, double youngs_modulus, double poissons_ratio) {
-    double shear = youngs_modulus / (2 * (1 + poissons_ratio));
-    return M_PI * radius * sqrt(density / shear) / (0.1631 * poissons_ratio + 0.8766);
-}
-
 const silt_dem_state *silt_dem_state_now(const silt_dem *dem) { return &dem->state; }
 
 int silt_dem_process(const silt_dem *dem) { return dem->link.pid; }
 
-bool silt_dem_own_fault(const silt_dem *dem) {
-    return !dem->link.failed || dem->link.gave_up;
-}
+bool silt_dem_own_fault(const silt_dem *dem) { return !dem->link.failed || dem->link.gave_up; }
 
 // ---- opening and closing
 
@@ -250,12 +243,10 @@ static void dem_reserve(silt_dem *dem, int n_grain) {
     SILT_RESERVE(dem->mass, dem->cap_grain[5], n_grain + 1);
     SILT_RESERVE(dem->contacts, dem->cap_grain[6], n_grain + 1);
     SILT_RESERVE(dem->on_bed, dem->cap_bed, n_grain + 1);
-    SILT_RESERVE(dem->body_x, dem->cap_body[0], 3 * dem->n_solid + 1);
-    SILT_RESERVE(dem->body_v, dem->cap_body[1], 3 * dem->n_solid + 1);
-    SILT_RESERVE(dem->body_omega, dem->cap_body[2], 3 * dem->n_solid + 1);
-    SILT_RESERVE(dem->body_q, dem->cap_body[3], 4 * dem->n_solid + 1);
-    SILT_RESERVE(dem->body_contact, dem->cap_body[4], 6 * dem->n_solid + 1);
-    SILT_RESERVE(dem->body_answer, dem->cap_body[5], 6 * dem->n_solid + 1);
+    double **const body[] = {&dem->body_x, &dem->body_v, &dem->body_omega, &dem->body_q, &dem->body_contact, &dem->body_answer};
+    static const int per[] = {3, 3, 3, 4, 6, 6};
+    for (int k = 0; k < 6; k++)
+        SILT_RESERVE(*body[k], dem->cap_body[k], per[k] * dem->n_solid + 1);
     dem->state.id = dem->id;
     dem->state.x = dem->x;
     dem->state.v = dem->v;
@@ -432,19 +423,6 @@ static silt_status dem_check_add(const silt_dem *dem, silt_error *err) {
     return SILT_OK;
 }
 
-static silt_status dem_check_load(const silt_dem *dem, const double *force, const double *body_force,
-                                  const double *body_torque, silt_error *err) {
-    for (int k = 0; force && k < dem->state.n_grain; k++)
-        if (!silt_dem_finite(3, &force[3 * k]))
-            return silt_fail(err, SILT_FAILED, "the force on grain %lld at %s is not finite: %s", (long long)dem->id[k],
-                             silt_dem_place(&dem->def, &dem->x[3 * k]).text, silt_dem_place(&dem->def, &force[3 * k]).text);
-    for (int k = 0; k < dem->n_solid; k++)
-        if ((body_force && !silt_dem_finite(3, &body_force[3 * k])) || (body_torque && !silt_dem_finite(3, &body_torque[3 * k])))
-            return silt_fail(err, SILT_FAILED, "the force or torque on rigid body %d at (%g, %g) is not finite", k,
-                             dem->body_x[3 * k], dem->body_x[3 * k + 1]);
-    return SILT_OK;
-}
-
 static int dem_find(const silt_dem *dem, int64_t id) {
     int lo = 0, hi = dem->n_live;
     while (lo < hi) {
@@ -519,7 +497,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         return silt_fail(err, SILT_FAILED, "discrete elements: %s",
                          n_step < 0 ? "a negative number of substeps" : "a run is under way");
     SILT_TRY(dem_check_add(dem, err));
-    SILT_TRY(dem_check_load(dem, force, body_force, body_torque, err));
+    SILT_TRY(silt_dem_check_load(&dem->def, &dem->state, force, body_force, body_torque, err));
     bool first = !dem->begun;
     SILT_TRY(dem_begin(dem, err));
 
@@ -537,8 +515,8 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     s->n_force = force ? dem->state.n_grain : 0;
     s->n_torque = dem->torque ? dem->state.n_grain : 0;
     s->n_shift = dem->shift ? dem->state.n_grain : 0;
-    s->n_guide = dem->n_guide;
     s->n_response = dem->response ? 36 * dem->n_free * dem->n_free : 0;
+    s->n_guide = dem->n_guide;
     s->max_grain = n_grain + dem->n_add;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
@@ -552,10 +530,10 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         memcpy(DEM_SECTION(s, double, torque), dem->torque, 3 * (size_t)s->n_torque * sizeof(double));
     if (dem->shift)
         memcpy(DEM_SECTION(s, double, shift), dem->shift, 3 * (size_t)s->n_shift * sizeof(double));
-    if (dem->n_guide)
-        memcpy(DEM_SECTION(s, char, guide), dem->guide, (size_t)dem->n_guide);
     if (dem->response)
         memcpy(DEM_SECTION(s, double, response), dem->response, (size_t)s->n_response * sizeof(double));
+    if (dem->n_guide)
+        memcpy(DEM_SECTION(s, char, guide), dem->guide, (size_t)dem->n_guide);
     dem->torque = dem->shift = dem->response = NULL;
     dem->n_guide = 0;
     for (int k = 0; k < dem->n_solid; k++) {

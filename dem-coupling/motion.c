@@ -27,8 +27,9 @@ static struct {
     void *bodies;        // LIGGGHTS' store of them
     motion_pose *pose;   // owned, one per guided body
     double (*arm)[3];    // owned, one per tie: in the axes of its body
-    double (*pull)[6];   // owned, one per body: force and torque of its ties
-    int n_pose, n_arm, n_pull, n_body;
+    int n_pose, n_arm, n_contact;
+    double (*contact)[3]; // owned, one per free body where forces are traced
+    const dem_shared *shared;
 } motion;
 
 #define MOTION_EXPORT __attribute__((visibility("default")))
@@ -97,8 +98,8 @@ static void motion_cross(const double *a, const double *b, double *c) {
 void motion_begin(dem_guide *guide, const dem_shared *shared) {
     motion.guide = guide;
     motion.step = shared->step;
+    motion.shared = shared;
     motion.dim = shared->dim;
-    motion.n_body = shared->n_body;
     motion.substep = motion.running = 0;
     if (!guide || !motion.bodies)
         return;
@@ -106,9 +107,9 @@ void motion_begin(dem_guide *guide, const dem_shared *shared) {
         motion.pose = realloc(motion.pose, (size_t)(motion.n_pose = guide->n_body) * sizeof *motion.pose);
     if (guide->n_tie > motion.n_arm)
         motion.arm = realloc(motion.arm, (size_t)(motion.n_arm = guide->n_tie) * sizeof *motion.arm);
-    if (guide->n_tie && motion.n_body > motion.n_pull)
-        motion.pull = realloc(motion.pull, (size_t)(motion.n_pull = motion.n_body) * sizeof *motion.pull);
-    if ((guide->n_body && !motion.pose) || (guide->n_tie && (!motion.arm || !motion.pull)))
+    if (guide->n_trace && shared->n_body > motion.n_contact)
+        motion.contact = realloc(motion.contact, (size_t)(motion.n_contact = shared->n_body) * sizeof *motion.contact);
+    if ((guide->n_body && !motion.pose) || (guide->n_tie && !motion.arm) || (motion.n_contact && !motion.contact))
         abort();
     for (int k = 0; k < guide->n_body; k++) {
         motion_body b;
@@ -146,7 +147,7 @@ static void motion_set_spin(const motion_body *b, const double *omega) {
             b->momentum[d] += b->inertia[c] * motion_dot(omega, b->axis[c]) * b->axis[c][d];
 }
 
-static void motion_pull(const dem_tie *tie, const double *local, const motion_body *b, double sum[6]) {
+static void motion_pull(const dem_tie *tie, const double *local, const motion_body *b) {
     double arm[3] = {0, 0, 0}, way[3], omega[3], speed[3], force[3], torque[3];
     for (int c = 0; c < 3; c++)
         for (int d = 0; d < motion.dim; d++)
@@ -169,28 +170,9 @@ static void motion_pull(const dem_tie *tie, const double *local, const motion_bo
         force[d] = -pull * way[d] / length;
     motion_cross(arm, force, torque);
     for (int d = 0; d < 3; d++) {
-        sum[d] += force[d];
-        sum[3 + d] += torque[d];
+        b->force[d] += force[d];
+        b->torque[d] += torque[d];
     }
-}
-
-// all ties, with what the water answers to them
-static void motion_ties(const dem_guide *guide) {
-    motion_body b;
-    if (!guide->n_tie)
-        return;
-    memset(motion.pull, 0, (size_t)motion.n_body * sizeof *motion.pull);
-    for (int k = 0; k < guide->n_tie; k++) {
-        const dem_tie *tie = &dem_guide_tie((dem_guide *)(uintptr_t)guide)[k];
-        if (motion_look(tie->slot, &b))
-            motion_pull(tie, motion.arm[k], &b, motion.pull[tie->slot]);
-    }
-    response_add(motion.pull[0]);
-    for (int k = 0; k < motion.n_body; k++)
-        for (int d = 0; d < 3 && motion_look(k, &b); d++) {
-            b.force[d] += motion.pull[k][d];
-            b.torque[d] += motion.pull[k][3 + d];
-        }
 }
 
 // the component of a held angle: in the plane about z, in space all
@@ -240,6 +222,48 @@ static void motion_guide(dem_guided *to, const motion_pose *from, const motion_b
     motion_hold(to->held, b);
 }
 
+// springs and lines, and what the water answers to them
+static void motion_ties(dem_guide *guide) {
+    motion_body b;
+    int last = -1;
+    for (int k = 0; k < guide->n_tie; k++) {
+        const dem_tie *tie = &dem_guide_tie(guide)[k];
+        double pull[6];
+        if (!motion_look(tie->slot, &b))
+            continue;
+        for (int d = 0; d < 3; d++) {
+            pull[d] = -b.force[d];
+            pull[3 + d] = -b.torque[d];
+        }
+        motion_pull(tie, motion.arm[k], &b);
+        for (int d = 0; d < 3; d++) {
+            pull[d] += b.force[d];
+            pull[3 + d] += b.torque[d];
+        }
+        response_tie(tie->slot, pull);
+        last = tie->slot > last ? tie->slot : last;
+    }
+    for (int slot = 0; last >= 0 && motion_look(slot, &b); slot++) {
+        double answer[6];
+        response_ties(slot, answer);
+        for (int d = 0; d < 3; d++) {
+            b.force[d] += answer[d];
+            b.torque[d] += answer[3 + d];
+        }
+    }
+}
+
+void motion_contact(int slot, double force[3]) { memcpy(force, motion.contact[slot], sizeof motion.contact[slot]); }
+
+static void motion_note(void) {
+    const dem_body *body = DEM_SECTION(motion.shared, const dem_body, body);
+    motion_body b;
+    for (int k = 0; k < motion.shared->n_body; k++)
+        for (int d = 0; d < 3; d++)
+            motion.contact[k][d] =
+                motion_look(k, &b) ? b.force[d] - body[k].force[d] - body[k].mass * motion.shared->gravity[d] : NAN;
+}
+
 MOTION_EXPORT void motion_forces(void *self, int set_up) __asm__(MOTION_FORCE);
 void motion_forces(void *self, int set_up) {
     static motion_force *original;
@@ -251,6 +275,8 @@ void motion_forces(void *self, int set_up) {
     motion.substep += motion.running;
     if (!guide || !motion.bodies || motion.substep > guide->n_step)
         return;
+    if (guide->n_trace)
+        motion_note();
     motion_ties(guide);
     for (int k = 0; k < guide->n_body; k++)
         if (motion_look(dem_guide_body(guide)[k].slot, &b))

@@ -85,8 +85,8 @@ typedef struct dem_shared {
     uint64_t force;       // 3 double per grain of the last answer, in its order
     uint64_t torque;      // 3 double per grain, alike
     uint64_t shift;       // 3 double per grain, alike
-    uint64_t guide;       // n_guide bytes, see guide.h
     uint64_t response;    // 6 n_body rows of as many double, see response.h
+    uint64_t guide;       // n_guide bytes, see guide.h
     uint64_t grain;       // dem_grain, rising tags (answer)
 } dem_shared;
 
@@ -108,8 +108,8 @@ static inline uint64_t dem_shared_layout(dem_shared *s) {
     DEM_PLACE(force, 3 * s->n_force, double);
     DEM_PLACE(torque, 3 * s->n_torque, double);
     DEM_PLACE(shift, 3 * s->n_shift, double);
-    DEM_PLACE(guide, s->n_guide, char);
     DEM_PLACE(response, s->n_response, double);
+    DEM_PLACE(guide, s->n_guide, char);
     DEM_PLACE(grain, s->max_grain, dem_grain);
 #undef DEM_PLACE
     return end;

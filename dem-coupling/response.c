@@ -21,27 +21,16 @@ static struct {
     dem_shared *shared;
     int call;              // since the run began; the first is that of its set-up
     double *sum;           // owned, contact forces of the present substep, ROW per body
+    double *tie;           // owned, the same of springs and lines
     double *centre;        // owned, 3 per body
     double **centre_row;   // owned, rows of centre
     int *first;            // owned, local index of each body's first sphere, -1: it has left
 } response;
 
-// Half kicks at the ends: the forces of the set-up, call 0, and of the last substep count half
+// Half kicks at the ends: the forces of the set-up and of the last substep count half
 static double response_weight(int call) {
     const int n = response.shared->n_step;
     return (call == 0 || call == n ? 0.5 : 1.0) / n;
-}
-
-static void response_times(const double *force, int b, double out[ROW]) {
-    const dem_shared *s = response.shared;
-    const double *matrix = DEM_SECTION(s, const double, response);
-    const int n = ROW * s->n_body;
-    for (int r = 0; r < ROW; r++) {
-        out[r] = 0;
-        for (int k = 0; k < n; k++)
-            if (force[k] != 0)
-                out[r] += matrix[(size_t)(ROW * b + r) * (size_t)n + (size_t)k] * force[k];
-    }
 }
 
 static void response_contacts(int n, const int *tag, double **x, double **force, double **torque) {
@@ -76,6 +65,17 @@ static void response_contacts(int n, const int *tag, double **x, double **force,
     }
 }
 
+// rows of body b
+static void response_times(int b, const double *force, double *out) {
+    const dem_shared *s = response.shared;
+    const double *matrix = DEM_SECTION(s, const double, response);
+    const size_t n = ROW * (size_t)s->n_body;
+    for (int r = 0; r < ROW; r++)
+        for (size_t k = 0; k < n; k++)
+            if (force[k] != 0)
+                out[r] += matrix[((size_t)ROW * (size_t)b + (size_t)r) * n + k] * force[k];
+}
+
 // the water's answer, on each body's first sphere
 static void response_answer(double **x, double **force, double **torque) {
     const dem_shared *s = response.shared;
@@ -84,7 +84,7 @@ static void response_answer(double **x, double **force, double **torque) {
         const int i = response.first[b];
         double out[ROW] = {0}, arm[3];
         if (i >= 0)
-            response_times(response.sum, b, out);
+            response_times(b, response.sum, out);
         for (int r = 0; r < ROW; r++) {
             body[b].contact[r] += response_weight(response.call) * response.sum[ROW * b + r];
             body[b].answer[r] += response_weight(response.call) * out[r];
@@ -113,6 +113,7 @@ static void response_step(void *self, long step, int n, int *tag, double **x, do
     void *data = response.centre_row;
     memset(response.centre, 0, 3 * (size_t)n_body * sizeof(double));
     memset(response.sum, 0, ROW * (size_t)n_body * sizeof(double));
+    memset(response.tie, 0, ROW * (size_t)n_body * sizeof(double));
     lg_push("xcm", "vector-multisphere", response.lmp, &data, "double");
     response_contacts(n, tag, x, force, torque);
     response_answer(x, force, torque);
@@ -133,10 +134,11 @@ int response_begin(void *lmp, dem_shared *shared) {
     response.shared = shared;
     response.call = 0;
     response.sum = realloc(response.sum, (ROW * n + 1) * sizeof(double));
+    response.tie = realloc(response.tie, (ROW * n + 1) * sizeof(double));
     response.centre = realloc(response.centre, (3 * n + 1) * sizeof(double));
     response.centre_row = realloc(response.centre_row, (n + 1) * sizeof *response.centre_row);
     response.first = realloc(response.first, (n + 1) * sizeof *response.first);
-    if (!response.sum || !response.centre || !response.centre_row || !response.first)
+    if (!response.sum || !response.tie || !response.centre || !response.centre_row || !response.first)
         return 0;
     for (size_t b = 0; b < n; b++) {
         response.centre_row[b] = response.centre + 3 * b;
@@ -146,20 +148,22 @@ int response_begin(void *lmp, dem_shared *shared) {
     return 1;
 }
 
-void response_add(double *force) {
-    const dem_shared *s = response.shared;
-    if (!s || !s->n_response || response.call == 0 || response.call > s->n_step + 1)
+static int response_tied(void) { return response.shared && response.shared->n_response && response.call > 0; }
+
+void response_tie(int slot, const double pull[6]) {
+    for (int r = 0; r < ROW && response_tied(); r++)
+        response.tie[ROW * slot + r] += pull[r];
+}
+
+void response_ties(int slot, double answer[6]) {
+    memset(answer, 0, ROW * sizeof *answer);
+    if (!response_tied())
         return;
-    dem_body *body = DEM_SECTION(s, dem_body, body);
-    const size_t n = ROW * (size_t)s->n_body;
-    memcpy(response.sum, force, n * sizeof *force);
-    for (int b = 0; b < s->n_body; b++) {
-        double out[ROW];
-        response_times(response.sum, b, out);
-        for (int r = 0; r < ROW; r++) {
-            body[b].answer[r] += response_weight(response.call - 1) * out[r];
-            force[ROW * b + r] += out[r];
-        }
+    dem_body *body = &DEM_SECTION(response.shared, dem_body, body)[slot];
+    response_times(slot, response.tie, answer);
+    for (int r = 0; r < ROW; r++) {
+        body->contact[r] += response_weight(response.call - 1) * response.tie[ROW * slot + r];
+        body->answer[r] += response_weight(response.call - 1) * answer[r];
     }
 }
 

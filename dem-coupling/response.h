@@ -14,8 +14,10 @@ int response_open(void *lmp);
 /** A run of shared->n_step substeps is about to be set up: what the sections `body` and `response` say holds for it.
  * @return 0: out of memory */
 int response_begin(void *lmp, dem_shared *shared);
-/** Adds the water's answer to other forces on the bodies in the present substep, ROW = 6 numbers a body; after the contacts were seen. */
-void response_add(double *force);
+/** A spring pulls at a free body, force and torque: it counts as a contact. Between the contacts of a substep and the next. */
+void response_tie(int slot, const double pull[6]);
+/** the answer to all of these on a body, once a substep */
+void response_ties(int slot, double answer[6]);
 /** Its means into the bodies: contact, answer. */
 void response_end(void);
 

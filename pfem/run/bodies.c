@@ -27,6 +27,14 @@ static void quaternion_times(const double p[4], const double q[4], double out[4]
         out[d + 1] = p[0] * q[d + 1] + q[0] * p[d + 1] + v[d];
 }
 
+static void quaternion_turn(const double q[4], const double x[3], double out[3]) {
+    double t[3], u[3];
+    cross(q + 1, x, t);
+    cross(q + 1, t, u);
+    for (int d = 0; d < 3; d++)
+        out[d] = x[d] + 2 * (q[0] * t[d] + u[d]);
+}
+
 // the turn that takes a to b
 static void quaternion_between(const double a[4], const double b[4], double out[4]) {
     const double back[4] = {a[0], -a[1], -a[2], -a[3]};
@@ -38,7 +46,7 @@ void silt_run_body_turn(const struct silt_body *before, const struct silt_body *
     for (int d = 0; d < dim; d++)
         arm[d] = x[d] - before->x[d];
     quaternion_between(before->q, now->q, turn);
-    silt_turn(turn, false, arm, out);
+    quaternion_turn(turn, arm, out);
     for (int d = 0; d < 3; d++)
         out[d] += now->x[d];
 }
@@ -168,7 +176,6 @@ typedef struct silt_impedance {
     double *mass;    // owned, the same, of the bodies
     double *answer;  // owned, the same: R of dem-coupling/response.h
     int *live;       // owned, rows of motion that is free
-    bool *free;      // owned, one per row: it is
 } silt_impedance;
 
 static void impedance_clear(silt_impedance *z) {
@@ -177,7 +184,6 @@ static void impedance_clear(silt_impedance *z) {
     free(z->mass);
     free(z->answer);
     free(z->live);
-    free(z->free);
 }
 
 // the tensor of inertia of a body in space's axes
@@ -187,7 +193,7 @@ static void inertia_turned(const struct silt_body *body, double tensor[3][3]) {
     double axis[3][3];
     for (int a = 0; a < 3; a++) {
         const double unit[3] = {a == 0, a == 1, a == 2};
-        silt_turn(body->q, false, unit, axis[a]);
+        quaternion_turn(body->q, unit, axis[a]);
     }
     memset(tensor, 0, 9 * sizeof(double));
     for (int a = 0; a < 3; a++)
@@ -197,9 +203,16 @@ static void inertia_turned(const struct silt_body *body, double tensor[3][3]) {
                     tensor[d][c] += own[a][b] * axis[a][d] * axis[b][c];
 }
 
-// true where no force changes this mode of a body now
-static bool mode_held(const struct silt_body *body, int mode) {
-    return mode < 3 ? body->held >> mode & 1 : (body->held & HELD_ANGLE) != 0;
+// whether forces move a body in this mode
+static bool moves(const silt_body_def *def, int mode) {
+    return def->motion == MOTION_FREE && !(def->held >> (mode < 3 ? mode : 3) & 1);
+}
+
+// it waits for its release, which hangs on the force that acts on it as it stands; in the rest of the step in which that comes it moves
+// with its own mass
+static bool waits(const silt_run *run, int b) {
+    const struct silt_body *body = &run->body_before[b];
+    return run->scene->body[b].release.on && silt_length(3, body->v) == 0 && silt_length(3, body->w) == 0;
 }
 
 static silt_impedance impedance_begin(const silt_run *run) {
@@ -215,7 +228,6 @@ static silt_impedance impedance_begin(const silt_run *run) {
     z.mass = silt_alloc(numbers, sizeof(double));
     z.answer = silt_alloc(numbers, sizeof(double));
     z.live = silt_alloc((size_t)z.size + 1, sizeof *z.live);
-    z.free = silt_alloc((size_t)z.size + 1, sizeof *z.free);
     for (int k = 0; k < z.n; k++) {
         const struct silt_body *body = &run->body_before[z.body[k]];
         double tensor[3][3];
@@ -225,11 +237,10 @@ static silt_impedance impedance_begin(const silt_run *run) {
             for (int c = 0; c < 3; c++)
                 z.mass[(ROW * k + 3 + d) * z.size + ROW * k + 3 + c] = tensor[d][c];
         }
+        const silt_body_def *def = &run->scene->body[z.body[k]];
         for (int m = 0; m < n_mode; m++)
-            if (!mode_held(body, mode[m])) {
+            if (moves(def, mode[m]) && !waits(run, z.body[k]))
                 z.live[z.n_live++] = ROW * k + mode[m];
-                z.free[ROW * k + mode[m]] = true;
-            }
     }
     return z;
 }
@@ -369,23 +380,33 @@ static silt_status impedance_tell(silt_run *run, silt_impedance *z, const double
     if (status != SILT_OK)
         goto done;
     times(n, z->mass, a, out);
-    // along what is held the water's force is that on the body as it goes on
-    for (int r = 0; r < n; r++)
-        out[r] = z->free[r] ? out[r] - weight[r] + gyration[r] : load[r] - weight[r] + gyration[r];
-    for (int k = 0; k < z->n; k++) {
-        memcpy(bodies->body[z->body[k]].force, out + ROW * k, 3 * sizeof *out);
-        memcpy(bodies->body[z->body[k]].torque, out + ROW * k + 3, 3 * sizeof *out);
-    }
+    for (int k = 0; k < z->n; k++)
+        for (int d = 0; d < 3; d++) { // what is not live is held or led
+            bodies->body[z->body[k]].force[d] = out[ROW * k + d] - weight[ROW * k + d];
+            bodies->body[z->body[k]].torque[d] = out[ROW * k + 3 + d] + gyration[ROW * k + 3 + d];
+        }
+    for (int k = 0; k < z->n; k++)
+        for (int d = 0; d < 3 && waits(run, z->body[k]); d++) {
+            bodies->body[z->body[k]].force[d] = force[ROW * z->body[k] + d];
+            bodies->body[z->body[k]].torque[d] = force[ROW * z->body[k] + 3 + d];
+        }
     for (int c = 0; c < n; c++) {
-        if (!z->free[c])
-            continue;
         memset(load, 0, (size_t)n * sizeof *load);
         load[c] = 1;
         impedance_move(z, factor, load, live, a);
         times(n, z->mass, a, out);
         for (int r = 0; r < n; r++)
-            z->answer[r * n + c] = z->free[r] ? out[r] - (r == c) : 0;
+            z->answer[r * n + c] = out[r] - (r == c);
     }
+    // what does not move under forces has no answer
+    uint8_t *free_row = silt_alloc((size_t)n + 1, 1);
+    for (int l = 0; l < m; l++)
+        free_row[z->live[l]] = 1;
+    for (int r = 0; r < n; r++)
+        for (int c = 0; c < n; c++)
+            if (!free_row[r] || !free_row[c])
+                z->answer[r * n + c] = 0;
+    free(free_row);
 done:
     free(factor);
     free(work);
@@ -492,26 +513,22 @@ silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_er
     run->body_error = 0;
     for (int b = 0; b < run->n_body_before; b++) {
         struct silt_body *body = &bodies->body[b];
+        const silt_body_def *def = &run->scene->body[b];
+        const struct silt_body *old = &run->body_before[b];
+        const bool still = waits(run, b);
         double off[3] = {0}, size = 0;
-        for (int d = 0; d < 3; d++) {
-            if (mode_held(body, d))
-                continue;
+        for (int d = 0; d < 3 && !still; d++) {
             // what moved it came of weight, contacts and water
-            const double moved = body->mass * (body->v[d] - run->body_before[b].v[d]) / run->dt, weight = body->mass * run->scene->gravity[d];
-            off[d] = moved - weight - body->contact[d] - body->force[d];
+            const double moved = body->mass * (body->v[d] - old->v[d]) / run->dt, weight = body->mass * run->scene->gravity[d];
+            off[d] = moves(def, d) ? moved - weight - body->contact[d] - body->force[d] : 0;
             size += fabs(moved) + fabs(weight) + fabs(body->contact[d]) + fabs(body->force[d]);
         }
         if (size > 0)
             run->body_error = silt_max(run->body_error, silt_length(3, off) / size);
-        for (int d = 0; d < 3; d++) {
-            double *carry = run->body_carry[b];
-            carry[d] = mode_held(body, d) ? 0 : carry[d] + run->dt * (force[ROW * b + d] - body->force[d]);
-            carry[3 + d] = mode_held(body, 3 + d) ? 0 : carry[3 + d] + run->dt * (force[ROW * b + 3 + d] - body->torque[d]);
-            // what holds a body answers the water's last word too
-            if (mode_held(body, d))
-                body->contact[d] += body->force[d] - force[ROW * b + d];
-            body->force[d] = force[ROW * b + d];
-            body->torque[d] = force[ROW * b + 3 + d];
+        for (int d = 0; d < 6; d++) {
+            double *told = d < 3 ? &body->force[d] : &body->torque[d - 3], *carry = &run->body_carry[b][d];
+            *carry = !still && moves(def, d) ? *carry + run->dt * (force[ROW * b + d] - *told) : 0;
+            *told = force[ROW * b + d];
         }
     }
     free(force);

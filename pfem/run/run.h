@@ -29,6 +29,7 @@ struct silt_run {
     silt_run_def def;
     char *out;        // owned
     char *worker;     // owned
+    char *trace;      // owned
     char *log;        // owned
 
     silt_walls walls;
@@ -152,7 +153,7 @@ silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_er
 
 // uplift.c --------------------------------------------------------------------------------------------
 /** Where bodies have nothing of the water's mesh on them, but no air either; of the present mesh. Makes *uplift at first. */
-void silt_uplift_find(silt_uplift **uplift, const silt_run *run);
+void silt_uplift_find(silt_uplift **uplift, silt_run *run);
 /** out, 6 numbers a body: += factor times force and torque of the pressure there, from p of the nodes around */
 void silt_uplift_force(const silt_uplift *uplift, const silt_run *run, const double *p, double factor, double *out);
 /** out, 2 per node: the pressure there on the water's nodes at its mouths. @return false: there are none */

@@ -132,7 +132,21 @@ static void rims_find(silt_uplift *u, const silt_run *run) {
         }
 }
 
-void silt_uplift_find(silt_uplift **uplift, const silt_run *run) {
+// Water that nothing but such gaps opens is closed: its nodes there are no free surface
+static void rims_close(const silt_uplift *u, silt_run *run) {
+    silt_mesh *mesh = &run->mesh;
+    for (int k = 0; k < u->n_rim; k++)
+        for (int c = 0; c < 2; c++)
+            mesh->surface[mesh->facet[u->rim[k][1]][c]] = 0;
+    for (int f = 0, k = 0; f < mesh->n_facet && u->n_rim; f++) {
+        for (k = 0; k < u->n_rim && u->rim[k][1] != f;)
+            k++;
+        for (int c = 0; c < 2 && mesh->facet_kind[f] == FACET_FREE && k == u->n_rim; c++)
+            mesh->surface[mesh->facet[f][c]] = 1;
+    }
+}
+
+void silt_uplift_find(silt_uplift **uplift, silt_run *run) {
     if (!*uplift)
         *uplift = silt_alloc(1, sizeof **uplift);
     silt_uplift *u = *uplift;
@@ -162,6 +176,7 @@ void silt_uplift_find(silt_uplift **uplift, const silt_run *run) {
         }
     }
     rims_find(u, run);
+    rims_close(u, run);
 }
 
 bool silt_uplift_mouths(const silt_uplift *u, const silt_run *run, double *out) {
