@@ -222,17 +222,6 @@ static void motion_guide(dem_guided *to, const motion_pose *from, const motion_b
     motion_hold(to->held, b);
 }
 
-void motion_contact(int slot, double force[3]) { memcpy(force, motion.contact[slot], sizeof motion.contact[slot]); }
-
-static void motion_note(void) {
-    const dem_body *body = DEM_SECTION(motion.shared, const dem_body, body);
-    motion_body b;
-    for (int k = 0; k < motion.shared->n_body; k++)
-        for (int d = 0; d < 3; d++)
-            motion.contact[k][d] =
-                motion_look(k, &b) ? b.force[d] - body[k].force[d] - body[k].mass * motion.shared->gravity[d] : NAN;
-}
-
 // springs and lines, and what the water answers to them
 static void motion_ties(dem_guide *guide) {
     motion_body b;
@@ -262,6 +251,17 @@ static void motion_ties(dem_guide *guide) {
             b.torque[d] += answer[3 + d];
         }
     }
+}
+
+void motion_contact(int slot, double force[3]) { memcpy(force, motion.contact[slot], sizeof motion.contact[slot]); }
+
+static void motion_note(void) {
+    const dem_body *body = DEM_SECTION(motion.shared, const dem_body, body);
+    motion_body b;
+    for (int k = 0; k < motion.shared->n_body; k++)
+        for (int d = 0; d < 3; d++)
+            motion.contact[k][d] =
+                motion_look(k, &b) ? b.force[d] - body[k].force[d] - body[k].mass * motion.shared->gravity[d] : NAN;
 }
 
 MOTION_EXPORT void motion_forces(void *self, int set_up) __asm__(MOTION_FORCE);

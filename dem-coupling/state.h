@@ -59,6 +59,7 @@ typedef struct coupling_body {
     silt_clump clump;
     bool fixed;
     bool freed; // its release has come
+    double first[4]; // orientation at the start
     double old_v[3];
 } coupling_body;
 
