@@ -2,6 +2,7 @@
 // way: adds springs, takes out what is held, and sets velocities so that a path is met.
 #define _GNU_SOURCE
 #include "motion.h"
+#include "response.h"
 
 #include <dlfcn.h>
 #include <math.h>
@@ -26,7 +27,9 @@ static struct {
     void *bodies;        // LIGGGHTS' store of them
     motion_pose *pose;   // owned, one per guided body
     double (*arm)[3];    // owned, one per tie: in the axes of its body
-    int n_pose, n_arm;
+    int n_pose, n_arm, n_contact;
+    double (*contact)[3]; // owned, one per free body where forces are traced
+    const dem_shared *shared;
 } motion;
 
 #define MOTION_EXPORT __attribute__((visibility("default")))
@@ -95,6 +98,7 @@ static void motion_cross(const double *a, const double *b, double *c) {
 void motion_begin(dem_guide *guide, const dem_shared *shared) {
     motion.guide = guide;
     motion.step = shared->step;
+    motion.shared = shared;
     motion.dim = shared->dim;
     motion.substep = motion.running = 0;
     if (!guide || !motion.bodies)
@@ -103,7 +107,9 @@ void motion_begin(dem_guide *guide, const dem_shared *shared) {
         motion.pose = realloc(motion.pose, (size_t)(motion.n_pose = guide->n_body) * sizeof *motion.pose);
     if (guide->n_tie > motion.n_arm)
         motion.arm = realloc(motion.arm, (size_t)(motion.n_arm = guide->n_tie) * sizeof *motion.arm);
-    if ((guide->n_body && !motion.pose) || (guide->n_tie && !motion.arm))
+    if (guide->n_trace && shared->n_body > motion.n_contact)
+        motion.contact = realloc(motion.contact, (size_t)(motion.n_contact = shared->n_body) * sizeof *motion.contact);
+    if ((guide->n_body && !motion.pose) || (guide->n_tie && !motion.arm) || (motion.n_contact && !motion.contact))
         abort();
     for (int k = 0; k < guide->n_body; k++) {
         motion_body b;
@@ -216,6 +222,48 @@ static void motion_guide(dem_guided *to, const motion_pose *from, const motion_b
     motion_hold(to->held, b);
 }
 
+// springs and lines, and what the water answers to them
+static void motion_ties(dem_guide *guide) {
+    motion_body b;
+    int last = -1;
+    for (int k = 0; k < guide->n_tie; k++) {
+        const dem_tie *tie = &dem_guide_tie(guide)[k];
+        double pull[6];
+        if (!motion_look(tie->slot, &b))
+            continue;
+        for (int d = 0; d < 3; d++) {
+            pull[d] = -b.force[d];
+            pull[3 + d] = -b.torque[d];
+        }
+        motion_pull(tie, motion.arm[k], &b);
+        for (int d = 0; d < 3; d++) {
+            pull[d] += b.force[d];
+            pull[3 + d] += b.torque[d];
+        }
+        response_tie(tie->slot, pull);
+        last = tie->slot > last ? tie->slot : last;
+    }
+    for (int slot = 0; last >= 0 && motion_look(slot, &b); slot++) {
+        double answer[6];
+        response_ties(slot, answer);
+        for (int d = 0; d < 3; d++) {
+            b.force[d] += answer[d];
+            b.torque[d] += answer[3 + d];
+        }
+    }
+}
+
+void motion_contact(int slot, double force[3]) { memcpy(force, motion.contact[slot], sizeof motion.contact[slot]); }
+
+static void motion_note(void) {
+    const dem_body *body = DEM_SECTION(motion.shared, const dem_body, body);
+    motion_body b;
+    for (int k = 0; k < motion.shared->n_body; k++)
+        for (int d = 0; d < 3; d++)
+            motion.contact[k][d] =
+                motion_look(k, &b) ? b.force[d] - body[k].force[d] - body[k].mass * motion.shared->gravity[d] : NAN;
+}
+
 MOTION_EXPORT void motion_forces(void *self, int set_up) __asm__(MOTION_FORCE);
 void motion_forces(void *self, int set_up) {
     static motion_force *original;
@@ -227,9 +275,9 @@ void motion_forces(void *self, int set_up) {
     motion.substep += motion.running;
     if (!guide || !motion.bodies || motion.substep > guide->n_step)
         return;
-    for (int k = 0; k < guide->n_tie; k++)
-        if (motion_look(dem_guide_tie(guide)[k].slot, &b))
-            motion_pull(&dem_guide_tie(guide)[k], motion.arm[k], &b);
+    if (guide->n_trace)
+        motion_note();
+    motion_ties(guide);
     for (int k = 0; k < guide->n_body; k++)
         if (motion_look(dem_guide_body(guide)[k].slot, &b))
             motion_guide(&dem_guide_body(guide)[k], &motion.pose[k], &b);

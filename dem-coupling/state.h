@@ -29,6 +29,18 @@ typedef struct coupling_grain {
     bool fixed;      // held where it is: frozen for LIGGGHTS
 } coupling_grain;
 
+/** what a run of substeps changes, as it was before: the water may refuse what came of it */
+typedef struct coupling_old {
+    bool kept;
+    int n_grain, grain_capacity;
+    coupling_grain *grain;     // owned
+    struct silt_body *body;    // owned
+    bool *freed;
+    double (*wall)[4], (*triangle)[10], (*centre)[4], (*pivot)[3]; // owned
+    double left[3];
+    int64_t left_count;
+} coupling_old;
+
 /** what grains() shows: borrowed by the caller, remade when it is stale */
 typedef struct coupling_view {
     silt_grain_state state;
@@ -47,6 +59,7 @@ typedef struct coupling_body {
     silt_clump clump;
     bool fixed;
     bool freed; // its release has come
+    double first[4]; // orientation at the start
     double old_v[3];
 } coupling_body;
 
@@ -68,6 +81,7 @@ struct silt_coupling {
     bool accelerates;        // one of them does so within a step: its rate is told substep by substep
     unsigned char *guide;    // owned, what the worker is told besides forces (guide.h)
     int guide_capacity;
+    FILE *trace;             // owned, NULL: none is asked for
     double width;            // m, accounting width: spheres stand for what is in this width of the slab; 1 in space
     double step;             // s, of the discrete elements
     double parcel;           // m, usual radius of a parcel, 0 without bed
@@ -98,6 +112,10 @@ struct silt_coupling {
     double *shift, *walk; // owned, m, 3 per grain; the same in LIGGGHTS' order
     double *torque;       // owned, 3 per grain, N m; NULL where the water exerts none
     silt_dem_sphere *add; // owned
+    coupling_old old;
+    bool responds;        // the running substeps answer contacts of bodies
+    double *response;     // owned, how
+    int response_capacity;
     double elapsed;       // s, of the running substeps
     double contact[3];    // N/m, of contacts on all grains, of the last substeps
     double left_mass, left_rest; // and what rounding left out of it (silt_sum)
@@ -138,10 +156,21 @@ void silt_coupling_twist(silt_coupling *coupling);
 bool silt_coupling_leaves(const silt_coupling *coupling, const double *a, const double *b, double near);
 /** a grain that LIGGGHTS no longer has: true when it went over an outlet; it is lost otherwise */
 bool silt_coupling_left_domain(const silt_coupling *coupling, const coupling_grain *grain);
+// answer.c
+/** see silt_coupling_type */
+void silt_coupling_respond(silt_coupling *coupling, int size, const double *matrix);
+/** The bodies' state after a run, and the forces of water and contacts on them in it. */
+void silt_coupling_bodies_receive(silt_coupling *coupling, const silt_dem_state *state);
+void silt_coupling_keep_old(silt_coupling *coupling);   /**< before a run that may be taken back */
+void silt_coupling_take_old(silt_coupling *coupling);   /**< takes it back, if it was kept, but for LIGGGHTS */
+void silt_coupling_forget_old(silt_coupling *coupling);
 // bodies.c
 /** Surfaces, clumps, masses and places of the scene's bodies. Errors (SILT_INPUT): a shape that cannot be, that is too thin for the
  * water's mesh, that lies behind a wall or in another body. */
 silt_status silt_coupling_bodies(silt_coupling *coupling, silt_error *err);
+/** in space: how a body is turned by an angle, radians, about its axis */
+void silt_coupling_orientation(const silt_body_def *def, double angle, double q[4]);
+silt_status silt_coupling_describe(const silt_scene *scene, FILE *to, silt_error *err);
 void silt_coupling_bodies_clear(silt_coupling *coupling);
 /** tells the discrete elements of them */
 silt_status silt_coupling_send_bodies(silt_coupling *coupling, silt_error *err);
@@ -161,10 +190,17 @@ void silt_coupling_wall_rates(silt_coupling *coupling, int m, int n, double (*ra
 // guide.c
 /** Tells the worker what guides bodies and walls in the next n substeps; nothing where nothing does. After silt_coupling_walls_go. */
 void silt_coupling_guide(silt_coupling *coupling, int n);
-/** after the run: who was set free */
-void silt_coupling_guided(silt_coupling *coupling);
+/** after the run: who was set free, what was traced */
+silt_status silt_coupling_guided(silt_coupling *coupling, silt_error *err);
 /** to and from a checkpoint: who was */
 silt_status silt_coupling_freed(silt_coupling *coupling, bool out, silt_store *store, silt_error *err);
+// trace.c
+struct dem_guide;
+/** Opens the file that contact.trace asks for; resumed: what it holds after `time` is cut. */
+silt_status silt_trace_open(silt_coupling *coupling, const char *path, bool resumed, double time, silt_error *err);
+int silt_trace_count(const silt_coupling *coupling); /**< forces in a row */
+void silt_trace_ask(const silt_coupling *coupling, struct dem_guide *guide);
+silt_status silt_trace_write(silt_coupling *coupling, const struct dem_guide *told, silt_error *err);
 /** where the path of a prescribed body has it at a time: x, y, z in m, angle in radians */
 void silt_coupling_place(const silt_coupling *coupling, int body, double time, double place[4]);
 

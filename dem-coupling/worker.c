@@ -2,6 +2,7 @@
  * file open; it does one instruction after the other until it is told to end or its parent is gone. */
 #define _GNU_SOURCE
 #include "motion.h"
+#include "response.h"
 #include "script.h"
 #include "touch.h"
 
@@ -398,6 +399,8 @@ static void worker_open(void) {
         worker_fail("LIGGGHTS does not start");
     worker.plane = worker_grow(worker.plane, (size_t)(s->n_wall + s->n_triangle), sizeof *worker.plane);
     script_open(worker.lmp, s, worker_path(DEM_FD_RESTART), worker.plane);
+    if (!response_open(worker.lmp))
+        worker_fail("LIGGGHTS has no fix external");
     if (s->resume) {
         worker_body_table();
         script_integrate(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
@@ -533,14 +536,36 @@ static void worker_walls(int substep) {
     script_motion(worker.lmp, s, (const double(*)[4])worker.rate);
 }
 
+// contact forces at the end of a substep: on grains all forces less weight and load, on bodies what they are told
+static void worker_trace(int substep) {
+    const dem_shared *s = worker.shared;
+    dem_guide *guide = worker_guide();
+    const dem_traced *traced = dem_guide_traced(guide);
+    double *out = dem_guide_trace(guide) + 3 * (size_t)substep * (size_t)guide->n_trace;
+    if (guide->n_trace == 0)
+        return;
+    worker_atoms a = worker_look();
+    double **load = lammps_extract_fix(worker.lmp, "dragforce", 1, 2, 0, 0);
+    worker_index(&a);
+    for (int k = 0; k < guide->n_trace; k++, out += 3) {
+        const int i = traced[k].order >= 0 && traced[k].order < worker.n_order ? worker_find(worker.order[traced[k].order]) : -1;
+        for (int c = 0; c < 3 && traced[k].slot < 0; c++)
+            out[c] = i >= 0 ? a.force[i][c] - load[i][c] - a.mass[i] * s->gravity[c] : NAN;
+        if (traced[k].slot >= 0)
+            motion_contact(traced[k].slot, out);
+    }
+}
+
 static void worker_advance(int n_step) {
     const double since = worker_seconds(CLOCK_MONOTONIC), cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID);
     const dem_guide *guide = worker_guide();
     motion_run();
-    if (guide && guide->n_wall)
+    if (guide && (guide->n_wall || guide->n_trace))
         for (int k = 0; k < n_step; k++) {
-            worker_walls(k);
+            if (guide->n_wall)
+                worker_walls(k);
             script_run(worker.lmp, 1);
+            worker_trace(k);
         }
     else
         script_run(worker.lmp, n_step);
@@ -574,12 +599,15 @@ static void worker_run(void) {
         worker_load();
         worker_walls(0);
         motion_begin(worker_guide(), s);
+        if (!response_begin(worker.lmp, s))
+            worker_fail("out of memory");
     }
     // the multisphere bodies' sums of forces cannot be reached: they are set up for every run (ten thousand grains: 5 ms)
     if (!worker.settled && (s->n_step > 0 || s->n_remove || s->n_add))
         worker_set_up();
     if (s->n_step > 0)
         worker_advance(s->n_step);
+    response_end();
     motion_end();
     worker_answer();
 }
