@@ -33,6 +33,13 @@ static silt_status body_plane(coupling_body *body, struct silt_body *state, cons
     return SILT_OK;
 }
 
+void silt_coupling_orientation(const silt_body_def *def, double angle, double q[4]) {
+    const double length = silt_length(3, def->axis), half = angle / 2.0;
+    q[0] = cos(half);
+    for (int d = 0; d < 3; d++)
+        q[1 + d] = length > 0.0 ? sin(half) * def->axis[d] / length : 0.0;
+}
+
 static silt_status body_space(const silt_scene *scene, coupling_body *body, struct silt_body *state, const silt_body_def *def, double angle,
                               silt_error *err) {
     char what[96];
@@ -41,15 +48,12 @@ static silt_status body_space(const silt_scene *scene, coupling_body *body, stru
     if (scene->fluid.on && thickness < h)
         return silt_fail(err, SILT_INPUT, "body %s: scale: found parts only %g m thick, allowed at least the water's size there, %g m: make it thicker or the mesh finer",
                          def->name, thickness, h);
-    snprintf(what, sizeof what, "body %s at the mesh's size of %g m", def->name, h);
+    snprintf(what, sizeof what, "body %.40s at the mesh's size of %g m", def->name, h);
     SILT_TRY(silt_solid_mesh(&body->form, h, what, &body->skin, err));
     silt_form_clump(&body->clump, &body->form, def->clump_error);
-    const double length = silt_length(3, def->axis), half = angle / 2.0;
-    state->q[0] = cos(half);
-    for (int d = 0; d < 3; d++) {
-        state->q[1 + d] = length > 0.0 ? sin(half) * def->axis[d] / length : 0.0;
+    silt_coupling_orientation(def, angle, state->q);
+    for (int d = 0; d < 3; d++)
         state->w[d] = body->fixed ? 0.0 : def->spin[d];
-    }
     state->mass = def->density * body->form.volume;
     for (int k = 0; k < 6; k++)
         state->inertia[k] = def->density * body->form.inertia[k];
@@ -136,7 +140,26 @@ silt_status silt_coupling_bodies(silt_coupling *c, silt_error *err) {
         }
         SILT_TRY(c->dim == 3 ? body_space(scene, &c->body[i], state, def, place[3], err) : body_plane(&c->body[i], state, def, place[3], err));
     }
+    for (int i = 0; i < scene->n_body; i++) {
+        c->bodies->body[i].n_sphere = c->body[i].clump.n_sphere;
+        c->bodies->body[i].clump_error = c->body[i].clump.error;
+    }
     return c->dim == 3 ? bodies_apart(c, err) : SILT_OK;
+}
+
+silt_status silt_coupling_describe(const silt_scene *scene, FILE *to, silt_error *err) {
+    silt_coupling c = {.scene = scene, .dim = scene->dimension == 3 ? 3 : 2};
+    const silt_status status = silt_coupling_bodies(&c, err);
+    for (int i = 0; i < scene->n_body && status == SILT_OK; i++) {
+        const struct silt_body *b = &c.bodies->body[i];
+        fprintf(to, "  body       %s: %g %s, %g kg%s, clump of %d spheres within %.3g m of its surface\n", scene->body[i].name, b->volume,
+                c.dim == 3 ? "m3" : "m2", b->mass, c.dim == 3 ? "" : " per m", b->n_sphere, b->clump_error);
+    }
+    silt_coupling_bodies_clear(&c);
+    free(c.body);
+    free(c.body_force);
+    free(c.body_torque);
+    return status;
 }
 
 void silt_coupling_bodies_clear(silt_coupling *c) {

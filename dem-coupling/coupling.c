@@ -446,9 +446,7 @@ static void coupling_add(silt_coupling *c) {
         silt_dem_add(c->dem, n, c->add);
 }
 
-static void coupling_keep(silt_coupling *c) {
-    silt_dem_keep(c->dem);
-}
+static void coupling_keep(silt_coupling *c) { silt_dem_keep(c->dem); }
 
 static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     if (c->refused.count > 0)
@@ -456,6 +454,8 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
 
     // forces in the order of the last state, of spheres as they are in the slab
     coupling_compact(c);
+    if (n > 0 && c->responds)
+        silt_coupling_keep_old(c);
     SILT_RESERVE(c->force, c->force_capacity, 3 * c->n_last);
     memset(c->force, 0, 3 * (size_t)c->n_last * sizeof *c->force);
     for (int i = 0, k = 0; i < c->n_grain; i++) {
@@ -558,16 +558,7 @@ static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
     c->n_last = state->n_grain;
     if (state->n_grain > 0)
         memcpy(c->last, state->id, (size_t)state->n_grain * sizeof *c->last);
-    for (int i = 0; i < state->n_body && i < c->bodies->count; i++) {
-        struct silt_body *b = &c->bodies->body[i];
-        memcpy(b->x, state->body_x + 3 * i, sizeof b->x);
-        memcpy(b->v, state->body_v + 3 * i, sizeof b->v);
-        memcpy(b->w, state->body_omega + 3 * i, sizeof b->w);
-        memcpy(b->q, state->body_q + 4 * i, sizeof b->q);
-        for (int k = 0; k < 3 && c->elapsed > 0.0; k++)
-            b->contact[k] =
-                b->mass * ((b->v[k] - c->body[i].old_v[k]) / c->elapsed - c->scene->gravity[k]) - b->force[k];
-    }
+    silt_coupling_bodies_receive(c, state);
     return SILT_OK;
 }
 
@@ -595,6 +586,8 @@ static silt_status coupling_recover(silt_coupling *c, silt_error *err) {
     if (!silt_dem_own_fault(c->dem))
         return SILT_FAILED;
     silt_dem_close(&c->dem);
+    silt_coupling_take_old(c);
+    coupling_touched(c);
     c->dem_def.append = true;
     SILT_TRY(coupling_open_dem(c, err));
     // it is told of everything anew
@@ -657,7 +650,8 @@ static void coupling_close(silt_coupling **coupling) {
                      w->contacts, w->map,        w->on_bed,      w,        c->grain,  c->drop, c->last,
                      c->body,     c->body_force, c->body_torque, c->force, c->add,    c->torque,
                      c->wall_motion, c->moving, c->centre, c->towards, c->pivot, c->rate,
-                     c->eddy,     c->shift,      c->walk};
+                     c->eddy,     c->shift,      c->walk,          c->response};
+    silt_coupling_forget_old(c);
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);
@@ -721,10 +715,12 @@ const silt_coupling_type silt_coupling_dem = {
     .bodies = coupling_bodies,
     .prepare = coupling_prepare,
     .load = coupling_load,
+    .respond = silt_coupling_respond,
     .walk = silt_coupling_walk,
     .gusts = silt_coupling_gusts,
     .exchanged = coupling_exchanged,
     .outline = coupling_outline,
+    .describe = silt_coupling_describe,
     .room = coupling_room,
     .release = coupling_release,
     .deposit = coupling_deposit,

@@ -33,33 +33,26 @@ struct silt_dem {
     silt_dem_sphere *add; // owned
     int n_guide; // bytes of guide
     const void *guide; // borrowed, of the next run
-    const double *torque, *shift; // borrowed, of the next run, NULL: none
+    const double *torque, *shift, *response; // borrowed, of the next run, NULL: none
     double (*rate)[4]; // owned, velocity and spin of every motion
     int n_solid, cap_solid, n_free, n_free_sphere;
     dem_solid *solid; // owned
     // the last state, owned
     silt_dem_state state;
-    int cap_grain[7], cap_body[4];
+    int cap_grain[7], cap_body[6];
     int64_t *id;
     double *x, *v, *omega, *radius, *mass;
     int *contacts;
     int cap_bed;
     uint8_t *on_bed;
-    double *body_x, *body_v, *body_omega, *body_q;
+    double *body_x, *body_v, *body_omega, *body_q, *body_contact, *body_answer;
 };
-
-double silt_dem_rayleigh(double radius, double density, double youngs_modulus, double poissons_ratio) {
-    double shear = youngs_modulus / (2 * (1 + poissons_ratio));
-    return M_PI * radius * sqrt(density / shear) / (0.1631 * poissons_ratio + 0.8766);
-}
 
 const silt_dem_state *silt_dem_state_now(const silt_dem *dem) { return &dem->state; }
 
 int silt_dem_process(const silt_dem *dem) { return dem->link.pid; }
 
-bool silt_dem_own_fault(const silt_dem *dem) {
-    return !dem->link.failed || dem->link.gave_up;
-}
+bool silt_dem_own_fault(const silt_dem *dem) { return !dem->link.failed || dem->link.gave_up; }
 
 // ---- opening and closing
 
@@ -72,7 +65,8 @@ void silt_dem_close(silt_dem **dem) {
         free((void *)d->solid[k].def.sphere);
     void *owned[] = {(void *)d->def.worker, (void *)d->def.log, (void *)d->def.wall, (void *)d->def.triangle, (void *)d->def.wall_motion,
                      (void *)d->def.motion, d->rate, d->live, d->remove, d->add, d->solid, d->id, d->x, d->v, d->omega,
-                     d->radius, d->mass, d->contacts, d->on_bed, d->body_x, d->body_v, d->body_omega, d->body_q};
+                     d->radius, d->mass, d->contacts, d->on_bed, d->body_x, d->body_v, d->body_omega, d->body_q,
+                     d->body_contact, d->body_answer};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
     free(d);
@@ -169,7 +163,7 @@ static silt_status dem_tell(silt_dem *dem, char word, int max_grain, silt_error 
     s->no_contacts = def->no_contacts;
     s->n_body = bodies ? dem->n_free : 0;
     s->n_body_sphere = bodies ? dem->n_free_sphere : 0;
-    s->n_remove = s->n_add = s->n_force = s->n_torque = s->n_shift = s->n_guide = 0;
+    s->n_remove = s->n_add = s->n_force = s->n_torque = s->n_shift = s->n_guide = s->n_response = 0;
     s->max_grain = max_grain;
     SILT_TRY(dem_link_reserve(&dem->link, err));
     s = dem->link.shared;
@@ -249,10 +243,10 @@ static void dem_reserve(silt_dem *dem, int n_grain) {
     SILT_RESERVE(dem->mass, dem->cap_grain[5], n_grain + 1);
     SILT_RESERVE(dem->contacts, dem->cap_grain[6], n_grain + 1);
     SILT_RESERVE(dem->on_bed, dem->cap_bed, n_grain + 1);
-    SILT_RESERVE(dem->body_x, dem->cap_body[0], 3 * dem->n_solid + 1);
-    SILT_RESERVE(dem->body_v, dem->cap_body[1], 3 * dem->n_solid + 1);
-    SILT_RESERVE(dem->body_omega, dem->cap_body[2], 3 * dem->n_solid + 1);
-    SILT_RESERVE(dem->body_q, dem->cap_body[3], 4 * dem->n_solid + 1);
+    double **const body[] = {&dem->body_x, &dem->body_v, &dem->body_omega, &dem->body_q, &dem->body_contact, &dem->body_answer};
+    static const int per[] = {3, 3, 3, 4, 6, 6};
+    for (int k = 0; k < 6; k++)
+        SILT_RESERVE(*body[k], dem->cap_body[k], per[k] * dem->n_solid + 1);
     dem->state.id = dem->id;
     dem->state.x = dem->x;
     dem->state.v = dem->v;
@@ -265,6 +259,8 @@ static void dem_reserve(silt_dem *dem, int n_grain) {
     dem->state.body_v = dem->body_v;
     dem->state.body_omega = dem->body_omega;
     dem->state.body_q = dem->body_q;
+    dem->state.body_contact = dem->body_contact;
+    dem->state.body_answer = dem->body_answer;
 }
 
 // pose of solid k into the state
@@ -376,6 +372,8 @@ static silt_status dem_take(silt_dem *dem, silt_error *err) {
                                                : "has left the box of the discrete elements",
                                     silt_dem_place(&dem->def, last).text);
         }
+        memcpy(dem->body_contact + 6 * k, b->contact, sizeof b->contact);
+        memcpy(dem->body_answer + 6 * k, b->answer, sizeof b->answer);
         double omega[3], q[4];
         dem_turned(dem, k, b, omega, q);
         dem_pose(dem, k, b->x, b->v, omega, q);
@@ -422,19 +420,6 @@ static silt_status dem_check_add(const silt_dem *dem, silt_error *err) {
                              silt_dem_place(&dem->def, def->lo).text, silt_dem_place(&dem->def, def->hi).text);
         last = a->id;
     }
-    return SILT_OK;
-}
-
-static silt_status dem_check_load(const silt_dem *dem, const double *force, const double *body_force,
-                                  const double *body_torque, silt_error *err) {
-    for (int k = 0; force && k < dem->state.n_grain; k++)
-        if (!silt_dem_finite(3, &force[3 * k]))
-            return silt_fail(err, SILT_FAILED, "the force on grain %lld at %s is not finite: %s", (long long)dem->id[k],
-                             silt_dem_place(&dem->def, &dem->x[3 * k]).text, silt_dem_place(&dem->def, &force[3 * k]).text);
-    for (int k = 0; k < dem->n_solid; k++)
-        if ((body_force && !silt_dem_finite(3, &body_force[3 * k])) || (body_torque && !silt_dem_finite(3, &body_torque[3 * k])))
-            return silt_fail(err, SILT_FAILED, "the force or torque on rigid body %d at (%g, %g) is not finite", k,
-                             dem->body_x[3 * k], dem->body_x[3 * k + 1]);
     return SILT_OK;
 }
 
@@ -512,7 +497,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         return silt_fail(err, SILT_FAILED, "discrete elements: %s",
                          n_step < 0 ? "a negative number of substeps" : "a run is under way");
     SILT_TRY(dem_check_add(dem, err));
-    SILT_TRY(dem_check_load(dem, force, body_force, body_torque, err));
+    SILT_TRY(silt_dem_check_load(&dem->def, &dem->state, force, body_force, body_torque, err));
     bool first = !dem->begun;
     SILT_TRY(dem_begin(dem, err));
 
@@ -530,6 +515,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
     s->n_force = force ? dem->state.n_grain : 0;
     s->n_torque = dem->torque ? dem->state.n_grain : 0;
     s->n_shift = dem->shift ? dem->state.n_grain : 0;
+    s->n_response = dem->response ? 36 * dem->n_free * dem->n_free : 0;
     s->n_guide = dem->n_guide;
     s->max_grain = n_grain + dem->n_add;
     SILT_TRY(dem_link_reserve(&dem->link, err));
@@ -544,9 +530,11 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
         memcpy(DEM_SECTION(s, double, torque), dem->torque, 3 * (size_t)s->n_torque * sizeof(double));
     if (dem->shift)
         memcpy(DEM_SECTION(s, double, shift), dem->shift, 3 * (size_t)s->n_shift * sizeof(double));
+    if (dem->response)
+        memcpy(DEM_SECTION(s, double, response), dem->response, (size_t)s->n_response * sizeof(double));
     if (dem->n_guide)
         memcpy(DEM_SECTION(s, char, guide), dem->guide, (size_t)dem->n_guide);
-    dem->torque = dem->shift = NULL;
+    dem->torque = dem->shift = dem->response = NULL;
     dem->n_guide = 0;
     for (int k = 0; k < dem->n_solid; k++) {
         if (dem->solid[k].slot < 0)
@@ -562,6 +550,7 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
 
 void silt_dem_twist(silt_dem *dem, const double *torque) { dem->torque = torque; }
 void silt_dem_shift(silt_dem *dem, const double *shift) { dem->shift = shift; }
+void silt_dem_respond(silt_dem *dem, const double *matrix) { dem->response = matrix; }
 
 void silt_dem_keep(silt_dem *dem) { dem->keep = true; }
 

@@ -73,6 +73,7 @@ typedef struct silt_dem_state {
     const uint8_t *on_bed;       // 1: one of them is a frozen sphere or a wall
     int n_body;
     const double *body_x, *body_v, *body_omega, *body_q; // 3, 3, 3, 4 (w, x, y, z) per body, order of adding
+    const double *body_contact, *body_answer; // 6 per body, N and N m, means of the last run, see silt_dem_respond
 } silt_dem_state;
 
 /** Starts the worker. Errors: worker not found, LIGGGHTS refused (with its last log line). */
@@ -95,6 +96,10 @@ silt_status silt_dem_start(silt_dem *dem, int n_step, const double *force, const
                            const double *body_torque, silt_error *err);
 /** Torques on the grains in the next run, 3 per grain in the order of the last state, N m; borrowed until then */
 void silt_dem_twist(silt_dem *dem, const double *torque);
+/** Contacts' answer in the next run: the force and torque R C is added to contact forces and torques C on the free bodies in every
+ * substep. matrix: 6 rows a free body, in order of adding, each of as many numbers; borrowed until then; NULL: none, and nothing is
+ * measured of contacts. */
+void silt_dem_respond(silt_dem *dem, const double *matrix);
 /** How the walls that move do so in the next runs, as stiff pieces: 4 numbers per motion, velocity in m/s and spin in rad/s, in the
  * plane from x to y, in space from x to z; and where they stand at the end of the next run, the numbers of the definition's walls or
  * triangles. */

@@ -50,6 +50,11 @@ silt_status silt_dem_check(const silt_dem_def *def, silt_error *err) {
     return SILT_OK;
 }
 
+double silt_dem_rayleigh(double radius, double density, double youngs_modulus, double poissons_ratio) {
+    double shear = youngs_modulus / (2 * (1 + poissons_ratio));
+    return M_PI * radius * sqrt(density / shear) / (0.1631 * poissons_ratio + 0.8766);
+}
+
 double silt_dem_sphere_at(const silt_dem_def *def, const silt_dem_body *body, int i, double x[3]) {
     const double *p = &body->sphere[silt_clump_width(def->dim) * i];
     if (def->dim == 3) {
@@ -91,5 +96,18 @@ silt_status silt_dem_check_body(const silt_dem_def *def, int index, const silt_d
             return silt_fail(err, SILT_FAILED, "rigid body %d: sphere %d at %s lies outside the box %s to %s", index, i,
                              silt_dem_place(def, x).text, silt_dem_place(def, def->lo).text, silt_dem_place(def, def->hi).text);
     }
+    return SILT_OK;
+}
+
+silt_status silt_dem_check_load(const silt_dem_def *def, const silt_dem_state *state, const double *force, const double *body_force,
+                                const double *body_torque, silt_error *err) {
+    for (int k = 0; force && k < state->n_grain; k++)
+        if (!silt_dem_finite(3, &force[3 * k]))
+            return silt_fail(err, SILT_FAILED, "the force on grain %lld at %s is not finite: %s", (long long)state->id[k],
+                             silt_dem_place(def, &state->x[3 * k]).text, silt_dem_place(def, &force[3 * k]).text);
+    for (int k = 0; k < state->n_body; k++)
+        if ((body_force && !silt_dem_finite(3, &body_force[3 * k])) || (body_torque && !silt_dem_finite(3, &body_torque[3 * k])))
+            return silt_fail(err, SILT_FAILED, "the force or torque on rigid body %d at (%g, %g) is not finite", k,
+                             state->body_x[3 * k], state->body_x[3 * k + 1]);
     return SILT_OK;
 }

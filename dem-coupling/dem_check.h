@@ -15,6 +15,10 @@ silt_status silt_dem_check_body(const silt_dem_def *def, int index, const silt_d
 /** where sphere i of a body is at its start; @return its radius */
 double silt_dem_sphere_at(const silt_dem_def *def, const silt_dem_body *body, int i, double x[3]);
 
+/** SILT_FAILED: a force of a run that is not finite */
+silt_status silt_dem_check_load(const silt_dem_def *def, const silt_dem_state *state, const double *force, const double *body_force,
+                                const double *body_torque, silt_error *err);
+
 /** a place as it stands in messages: two numbers in the slab, three in space */
 typedef struct silt_dem_text {
     char text[96];

@@ -349,18 +349,21 @@ silt_status silt_form_create(silt_solid *s, const silt_body_def *body, silt_erro
 }
 
 double silt_form_thickness(const silt_solid *s) {
+    // points that lie on no diagonal of what is opposite
+    static const double weight[3] = {0.5, 0.3, 0.2};
     double thickness = HUGE_VAL;
-    for (int f = 0; f < s->n_face; f++) {
-        double x[3] = {0}, inwards[3];
-        int hit = -1;
-        for (int d = 0; d < 3; d++) {
-            for (int k = 0; k < 3; k++)
-                x[d] += s->point[s->face[f][k]][d] / 3;
-            inwards[d] = -s->normal[f][d];
+    for (int f = 0; f < s->n_face; f++)
+        for (int turn = 0; turn < 3; turn++) {
+            double x[3] = {0}, inwards[3];
+            int hit = -1;
+            for (int d = 0; d < 3; d++) {
+                for (int k = 0; k < 3; k++)
+                    x[d] += weight[(k + turn) % 3] * s->point[s->face[f][k]][d];
+                inwards[d] = -s->normal[f][d];
+            }
+            const double way = silt_solid_ray(s, x, inwards, 1e-9 * s->radius, &hit);
+            if (hit >= 0 && wall_dot(s->normal[hit], inwards) > 0.7)
+                thickness = silt_min(thickness, way);
         }
-        const double way = silt_solid_ray(s, x, inwards, 1e-9 * s->radius, &hit);
-        if (hit >= 0 && wall_dot(s->normal[hit], inwards) > 0.7)
-            thickness = silt_min(thickness, way);
-    }
     return thickness;
 }

@@ -31,10 +31,12 @@ static void guide_body(const silt_coupling *c, dem_guide *guide, dem_guided *to,
     *to = (dem_guided){.slot = guide_slot(c, i), .held = def->held, .path = -1, .release = INT32_MAX, .force = HUGE_VAL};
     if (def->motion == MOTION_PRESCRIBED) {
         to->path = (*n_path)++;
-        double(*row)[4] = dem_guide_path(guide, to->path);
+        double(*row)[4] = dem_guide_path(guide, to->path), now[4] = {0, 0, 0, 2 * atan2(b->q[3], b->q[0])};
+        if (c->dim == 3) // where the path had it: an angle cannot be read off a body in space
+            silt_coupling_place(c, i, guide_time(c, n, 0), now);
         for (int k = 0; k <= n; k++) {
             silt_coupling_place(c, i, guide_time(c, n, k + 1), row[k]);
-            row[k][3] -= 2 * atan2(b->q[3], b->q[0]);
+            row[k][3] -= now[3];
         }
     } else if (def->release.on && !c->body[i].freed) {
         to->held = HELD_ALL;
@@ -53,10 +55,16 @@ static void guide_ties(const silt_coupling *c, dem_guide *guide, int i, dem_tie 
     const double turn = 2 * atan2(b->q[3], b->q[0]) - def->angle * M_PI / 180, cosine = cos(turn), sine = sin(turn);
     for (int k = 0; k < def->n_spring; k++) {
         const silt_spring_def *s = &def->spring[k];
-        const double arm[2] = {s->at[0] - def->at[0], s->at[1] - def->at[1]};
+        const double arm[3] = {s->at[0] - def->at[0], s->at[1] - def->at[1], s->at[2] - def->at[2]};
         to[k] = (dem_tie){.slot = guide_slot(c, i), .line = s->line, .arm = {cosine * arm[0] - sine * arm[1], sine * arm[0] + cosine * arm[1]},
                           .stiffness = s->stiffness * c->width, .damping = s->damping * c->width, .length = s->length};
         memcpy(to[k].to, s->to, sizeof to[k].to);
+        if (c->dim == 3) {
+            double start[4];
+            silt_coupling_orientation(def, def->angle * M_PI / 180, start);
+            silt_turn(start, true, arm, to[k].arm);
+            silt_turn(b->q, false, to[k].arm, to[k].arm);
+        }
     }
     (void)guide;
 }

@@ -2,6 +2,7 @@
 // way: adds springs, takes out what is held, and sets velocities so that a path is met.
 #define _GNU_SOURCE
 #include "motion.h"
+#include "response.h"
 
 #include <dlfcn.h>
 #include <math.h>
@@ -216,6 +217,37 @@ static void motion_guide(dem_guided *to, const motion_pose *from, const motion_b
     motion_hold(to->held, b);
 }
 
+// springs and lines, and what the water answers to them
+static void motion_ties(dem_guide *guide) {
+    motion_body b;
+    int last = -1;
+    for (int k = 0; k < guide->n_tie; k++) {
+        const dem_tie *tie = &dem_guide_tie(guide)[k];
+        double pull[6];
+        if (!motion_look(tie->slot, &b))
+            continue;
+        for (int d = 0; d < 3; d++) {
+            pull[d] = -b.force[d];
+            pull[3 + d] = -b.torque[d];
+        }
+        motion_pull(tie, motion.arm[k], &b);
+        for (int d = 0; d < 3; d++) {
+            pull[d] += b.force[d];
+            pull[3 + d] += b.torque[d];
+        }
+        response_tie(tie->slot, pull);
+        last = tie->slot > last ? tie->slot : last;
+    }
+    for (int slot = 0; last >= 0 && motion_look(slot, &b); slot++) {
+        double answer[6];
+        response_ties(slot, answer);
+        for (int d = 0; d < 3; d++) {
+            b.force[d] += answer[d];
+            b.torque[d] += answer[3 + d];
+        }
+    }
+}
+
 MOTION_EXPORT void motion_forces(void *self, int set_up) __asm__(MOTION_FORCE);
 void motion_forces(void *self, int set_up) {
     static motion_force *original;
@@ -227,9 +259,7 @@ void motion_forces(void *self, int set_up) {
     motion.substep += motion.running;
     if (!guide || !motion.bodies || motion.substep > guide->n_step)
         return;
-    for (int k = 0; k < guide->n_tie; k++)
-        if (motion_look(dem_guide_tie(guide)[k].slot, &b))
-            motion_pull(&dem_guide_tie(guide)[k], motion.arm[k], &b);
+    motion_ties(guide);
     for (int k = 0; k < guide->n_body; k++)
         if (motion_look(dem_guide_body(guide)[k].slot, &b))
             motion_guide(&dem_guide_body(guide)[k], &motion.pose[k], &b);

@@ -46,6 +46,7 @@ typedef struct dem_body {
     double x[3], v[3], omega[3]; // omega of an answer in space: angular momentum
     double axis[3][3]; // directions of lines fixed in the body, in the plane the first
     double force[3], torque[3];
+    double contact[6], answer[6]; // mean force and torque of contacts, and what the water answered (response.h); with n_response only
     int present, pad; // 0: it left the box
 } dem_body;
 
@@ -64,7 +65,7 @@ typedef struct dem_shared {
     double step, max_radius, min_radius;
     int resume, no_contacts;
     // lengths of the sections
-    int n_wall, n_triangle, n_motion, n_body, n_body_sphere, n_remove, n_add, n_force, n_torque, n_shift, n_guide, max_grain;
+    int n_wall, n_triangle, n_motion, n_body, n_body_sphere, n_remove, n_add, n_force, n_torque, n_shift, n_guide, n_response, max_grain;
     int n_step;
     int keep; // 1: this run may go on from the last one's end
     // answer
@@ -84,6 +85,7 @@ typedef struct dem_shared {
     uint64_t force;       // 3 double per grain of the last answer, in its order
     uint64_t torque;      // 3 double per grain, alike
     uint64_t shift;       // 3 double per grain, alike
+    uint64_t response;    // 6 n_body rows of as many double, see response.h
     uint64_t guide;       // n_guide bytes, see guide.h
     uint64_t grain;       // dem_grain, rising tags (answer)
 } dem_shared;
@@ -106,6 +108,7 @@ static inline uint64_t dem_shared_layout(dem_shared *s) {
     DEM_PLACE(force, 3 * s->n_force, double);
     DEM_PLACE(torque, 3 * s->n_torque, double);
     DEM_PLACE(shift, 3 * s->n_shift, double);
+    DEM_PLACE(response, s->n_response, double);
     DEM_PLACE(guide, s->n_guide, char);
     DEM_PLACE(grain, s->max_grain, dem_grain);
 #undef DEM_PLACE

@@ -526,6 +526,8 @@ void script_open(void *lmp, const dem_shared *s, const char *restart, int *plane
         script_say(lmp, "fix grav all gravity %.17g vector %.17g %.17g %.17g", g, s->gravity[0] / g, s->gravity[1] / g,
                    s->dim == 3 ? s->gravity[2] / g : 0);
     script_walls(lmp, s, plane);
+    // sees the forces of contacts; the water's come after it
+    script_say(lmp, "fix imp all external pf/callback 1 1000000000");
     // the force on a sphere or, through one of its spheres, on a body; has to stand before the bodies
     script_say(lmp, "fix cfd all couple/cfd couple_every 0 mpi");
     script_say(lmp, "fix cff all couple/cfd/force");

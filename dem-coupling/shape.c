@@ -72,8 +72,10 @@ silt_status silt_outline_create(silt_outline *shape, const silt_body_def *body, 
         shape->n_point = disc_points;
         shape->point = silt_alloc(2 * (size_t)disc_points, sizeof(double));
         for (int i = 0; i < disc_points; i++) {
-            shape->point[2 * i] = w / 2.0 * cos(2.0 * M_PI * i / disc_points);
-            shape->point[2 * i + 1] = w / 2.0 * sin(2.0 * M_PI * i / disc_points);
+            // a polygon of the circle's area
+            const double r = w / 2.0 * sqrt(2.0 * M_PI / disc_points / sin(2.0 * M_PI / disc_points));
+            shape->point[2 * i] = r * cos(2.0 * M_PI * i / disc_points);
+            shape->point[2 * i + 1] = r * sin(2.0 * M_PI * i / disc_points);
         }
         break;
     case SHAPE_WEDGE: {
@@ -238,6 +240,16 @@ int silt_outline_nodes(const silt_outline *shape, double h, double *point, int c
             if (point != NULL && n < capacity)
                 memcpy(point + 2 * n, x, sizeof x);
         }
+    }
+    // what is round all the way stands a little outside of the outline, so that the area is the same
+    bool round = n_run == 1 && point != NULL && n <= capacity;
+    for (int i = 0; i < shape->n_point && round; i++)
+        round = !shape_corner(shape, i);
+    if (round) {
+        double area, centroid[2], moment;
+        shape_integrate(n, point, &area, centroid, &moment);
+        for (int i = 0; i < 2 * n; i++)
+            point[i] *= sqrt(shape->area / area);
     }
     free(run);
     return n;

@@ -29,6 +29,18 @@ typedef struct coupling_grain {
     bool fixed;      // held where it is: frozen for LIGGGHTS
 } coupling_grain;
 
+/** what a run of substeps changes, as it was before: the water may refuse what came of it */
+typedef struct coupling_old {
+    bool kept;
+    int n_grain, grain_capacity;
+    coupling_grain *grain;     // owned
+    struct silt_body *body;    // owned
+    bool *freed;
+    double (*wall)[4], (*triangle)[10], (*centre)[4], (*pivot)[3]; // owned
+    double left[3];
+    int64_t left_count;
+} coupling_old;
+
 /** what grains() shows: borrowed by the caller, remade when it is stale */
 typedef struct coupling_view {
     silt_grain_state state;
@@ -98,6 +110,10 @@ struct silt_coupling {
     double *shift, *walk; // owned, m, 3 per grain; the same in LIGGGHTS' order
     double *torque;       // owned, 3 per grain, N m; NULL where the water exerts none
     silt_dem_sphere *add; // owned
+    coupling_old old;
+    bool responds;        // the running substeps answer contacts of bodies
+    double *response;     // owned, how
+    int response_capacity;
     double elapsed;       // s, of the running substeps
     double contact[3];    // N/m, of contacts on all grains, of the last substeps
     double left_mass, left_rest; // and what rounding left out of it (silt_sum)
@@ -138,10 +154,21 @@ void silt_coupling_twist(silt_coupling *coupling);
 bool silt_coupling_leaves(const silt_coupling *coupling, const double *a, const double *b, double near);
 /** a grain that LIGGGHTS no longer has: true when it went over an outlet; it is lost otherwise */
 bool silt_coupling_left_domain(const silt_coupling *coupling, const coupling_grain *grain);
+// answer.c
+/** see silt_coupling_type */
+void silt_coupling_respond(silt_coupling *coupling, int size, const double *matrix);
+/** The bodies' state after a run, and the forces of water and contacts on them in it. */
+void silt_coupling_bodies_receive(silt_coupling *coupling, const silt_dem_state *state);
+void silt_coupling_keep_old(silt_coupling *coupling);   /**< before a run that may be taken back */
+void silt_coupling_take_old(silt_coupling *coupling);   /**< takes it back, if it was kept, but for LIGGGHTS */
+void silt_coupling_forget_old(silt_coupling *coupling);
 // bodies.c
 /** Surfaces, clumps, masses and places of the scene's bodies. Errors (SILT_INPUT): a shape that cannot be, that is too thin for the
  * water's mesh, that lies behind a wall or in another body. */
 silt_status silt_coupling_bodies(silt_coupling *coupling, silt_error *err);
+/** in space: how a body is turned by an angle, radians, about its axis */
+void silt_coupling_orientation(const silt_body_def *def, double angle, double q[4]);
+silt_status silt_coupling_describe(const silt_scene *scene, FILE *to, silt_error *err);
 void silt_coupling_bodies_clear(silt_coupling *coupling);
 /** tells the discrete elements of them */
 silt_status silt_coupling_send_bodies(silt_coupling *coupling, silt_error *err);

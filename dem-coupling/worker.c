@@ -2,6 +2,7 @@
  * file open; it does one instruction after the other until it is told to end or its parent is gone. */
 #define _GNU_SOURCE
 #include "motion.h"
+#include "response.h"
 #include "script.h"
 #include "touch.h"
 
@@ -398,6 +399,8 @@ static void worker_open(void) {
         worker_fail("LIGGGHTS does not start");
     worker.plane = worker_grow(worker.plane, (size_t)(s->n_wall + s->n_triangle), sizeof *worker.plane);
     script_open(worker.lmp, s, worker_path(DEM_FD_RESTART), worker.plane);
+    if (!response_open(worker.lmp))
+        worker_fail("LIGGGHTS has no fix external");
     if (s->resume) {
         worker_body_table();
         script_integrate(worker.lmp, s, worker_path(worker.scratch), worker.scratch);
@@ -574,12 +577,15 @@ static void worker_run(void) {
         worker_load();
         worker_walls(0);
         motion_begin(worker_guide(), s);
+        if (!response_begin(worker.lmp, s))
+            worker_fail("out of memory");
     }
     // the multisphere bodies' sums of forces cannot be reached: they are set up for every run (ten thousand grains: 5 ms)
     if (!worker.settled && (s->n_step > 0 || s->n_remove || s->n_add))
         worker_set_up();
     if (s->n_step > 0)
         worker_advance(s->n_step);
+    response_end();
     motion_end();
     worker_answer();
 }

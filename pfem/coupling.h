@@ -46,12 +46,17 @@ typedef struct silt_coupling_type {
      * forces on bodies: force and torque in bodies()->body[] were set by the run. */
     void (*load)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, double dt);
 
+    /** Before start: in every substep R C is added to the forces and torques C of contacts on free bodies, 6 numbers a body; size
+     * rows and columns. bodies()->body[].force and torque then tell what the water exerted in all. */
+    void (*respond)(silt_coupling *coupling, int size, const double *matrix);
     /** After load: a step of the random walk of suspended grains, if the scene asks for it. viscosity: per cell of the water, Pa s,
      * with its eddies; step: counts the steps of the run. Grains are where they go at the next start. */
     void (*walk)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, const double *viscosity, double dt, int64_t step);
     /** After load: the gusts of the step that begins at `time`, if the scene asks for them. */
     void (*gusts)(silt_coupling *coupling, const silt_nodes *nodes, const silt_mesh *mesh, const double *viscosity, double time);
 
+    /** a line about every body of a scene: volume, mass, clump; errors as open's for bodies, walls apart */
+    silt_status (*describe)(const silt_scene *scene, FILE *to, silt_error *err);
     /** of the last load and the last substeps */
     void (*exchanged)(const silt_coupling *coupling, silt_exchanged *exchanged);
     /** Points on a body's outline at spacing h, corners kept, in the body's frame, dim numbers each; in space those of its surface,

@@ -390,6 +390,8 @@ typedef struct silt_body_state {
         double mass;                   // kg
         double inertia[6];             // kg m2 about the centroid in the body's frame: xx, yy, zz, xy, xz, yz; in 2-D zz alone counts
         double volume;                 // m3; 2-D: m2
+        int n_sphere;                  // of the clump that makes its contacts
+        double clump_error;            // m, how far they leave the surface
         int n_point;
         const double *point;           // of the surface, dim each, in the body's frame about the centroid, borrowed; in 2-D in order,
                                        // counter-clockwise

@@ -303,6 +303,55 @@ static void test_body_impulse(void **unused) {
 }
 
 // falls, rests on two of its spheres: Hertz overlap of half the weight each, reaction = weight, in its plane
+// With an added mass and inertia as its answer to contacts a body bounces, slips and spins as one that is heavier by so much, and what is
+// measured of contacts and of the answer is what it got.
+static void test_body_response(void **unused) {
+    (void)unused;
+    const double walls[1][4] = {{-0.55, 0, 0.55, 0}};
+    const double m = 0.05, added = 0.2, inertia = 4e-6, turned = 9e-6;
+    double end[2][6], worst = 0, touched = 0;
+    for (int heavy = 0; heavy < 2; heavy++) {
+        silt_dem_def def = plain();
+        silt_dem *dem = NULL;
+        def.gravity[1] = -9.81;
+        def.restitution = 1;
+        def.n_wall = 1;
+        def.wall = walls;
+        OK(silt_dem_open(&dem, &def, &error));
+        silt_dem_body body = {.n_sphere = 5, .sphere = plus, .mass = m + heavy * added, .inertia = inertia + heavy * turned,
+                              .x = {0.1, 0.06}, .v = {0.5, -0.2}, .omega = {0, 0, 3}, .angle = 0.3};
+        OK(silt_dem_add_body(dem, &body, &error));
+        // both fall as the light one does with the water's inertia
+        double response[36] = {0}, force[3] = {0};
+        response[0] = response[7] = m / (m + added) - 1;
+        response[35] = inertia / (inertia + turned) - 1;
+        force[1] = heavy ? 9.81 * added : 9.81 * m * added / (m + added);
+        const silt_dem_state *s = advance(dem, 0, NULL, NULL, NULL);
+        for (int i = 0; i < 150; i++) {
+            const double before[3] = {s->body_v[0], s->body_v[1], s->body_omega[2]};
+            if (!heavy)
+                silt_dem_respond(dem, response);
+            s = advance(dem, 100, NULL, force, NULL);
+            const double *c = s->body_contact, *a = s->body_answer, t = 100 * def.step;
+            if (heavy)
+                continue;
+            touched = fmax(touched, c[1]);
+            worst = fmax(worst, fabs(m * (s->body_v[0] - before[0]) - t * (c[0] + a[0])));
+            worst = fmax(worst, fabs(m * (s->body_v[1] - before[1]) - t * (c[1] + a[1] + force[1] - 9.81 * m)));
+            worst = fmax(worst, fabs(inertia * (s->body_omega[2] - before[2]) - t * (c[5] + a[5])) / 0.01);
+        }
+        const double now[6] = {s->body_x[0], s->body_x[1], s->body_v[0], s->body_v[1], s->body_omega[2], body_angle(s->body_q)};
+        memcpy(end[heavy], now, sizeof now);
+        silt_dem_close(&dem);
+    }
+    print_message("answered: x (%.6f, %.6f), heavier: (%.6f, %.6f); momentum off by %.1e kg m/s, contact up to %.3g N\n", end[0][0], end[0][1],
+                  end[1][0], end[1][1], worst, touched);
+    assert_true(touched > 1);
+    for (int k = 0; k < 6; k++)
+        near(end[0][k], end[1][k], 1e-8, "answered against heavier");
+    near(worst, 0, 1e-15, "momentum");
+}
+
 static void test_body_rests(void **unused) {
     (void)unused;
     const double walls[2][1][4] = {{{-1, 0, 1, 0}}, {{-0.55, 0, 0.55, 0}}};
@@ -859,7 +908,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_open_close), cmocka_unit_test(test_free_fall),   cmocka_unit_test(test_impulse), cmocka_unit_test(test_twist),
         cmocka_unit_test(test_bounce),     cmocka_unit_test(test_sliding),     cmocka_unit_test(test_body_impulse),
-        cmocka_unit_test(test_body_rests), cmocka_unit_test(test_body_slides), cmocka_unit_test(test_edits),
+        cmocka_unit_test(test_body_response), cmocka_unit_test(test_body_rests), cmocka_unit_test(test_body_slides), cmocka_unit_test(test_edits),
         cmocka_unit_test(test_deposit),    cmocka_unit_test(test_checkpoint),  cmocka_unit_test(test_empty_checkpoint),
         cmocka_unit_test(test_keep),
         cmocka_unit_test(test_failures),   cmocka_unit_test(test_orphan),

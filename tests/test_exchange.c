@@ -653,13 +653,12 @@ static void test_outlines(void **unused) {
     shape_extent(&box, 0.4, 0.4);
     silt_outline_clear(&box);
 
-    // disc: regular polygon of n points on radius r: n/2 r^2 sin(2 pi/n), A r^2 (2 + cos(2 pi/n))/6; near the circle's
+    // disc: regular polygon of the circle's area; of n points on radius r: n/2 r^2 sin(2 pi/n), A r^2 (2 + cos(2 pi/n))/6
     silt_outline disc = shape_of(SHAPE_DISC, 0.2, 0);
-    double step = 2 * M_PI / disc.n_point, area = disc.n_point / 2.0 * 0.01 * sin(step);
+    double step = 2 * M_PI / disc.n_point, area = M_PI * 0.01, square = 2 * area / (disc.n_point * sin(step));
     assert_true(disc.n_point >= 64);
     near(disc.area, area, 1e-15, "area of a disc");
-    near(disc.inertia, area * 0.01 * (2 + cos(step)) / 6, 1e-16, "inertia of a disc");
-    near(disc.area / (M_PI * 0.01), 1, 5e-4, "area over the circle's");
+    near(disc.inertia, area * square * (2 + cos(step)) / 6, 1e-16, "inertia of a disc");
     silt_outline_clear(&disc);
 
     // triangle given anywhere and clockwise, base 3, height 2, scaled to 0.6: A = bh/2, about the centroid bh(b^2 - ba
@@ -712,7 +711,8 @@ static void test_outline_nodes(void **unused) {
     assert_int_equal(silt_outline_nodes(&disc, 0.05, NULL, 0), 13);
     for (int i = 0; i < n; i++) {
         const double *a = point + 2 * i, *b = point + 2 * ((i + 1) % n);
-        near(hypot(a[0] - b[0], a[1] - b[1]), 0.2 * sin(M_PI / 13), 1e-4, "spacing on a disc");
+        // 13 points around the circle's area
+        near(hypot(a[0] - b[0], a[1] - b[1]), 2 * sin(M_PI / 13) * sqrt(2 * M_PI * 0.01 / (13 * sin(2 * M_PI / 13))), 1e-4, "spacing on a disc");
     }
     assert_int_equal(silt_outline_nodes(&disc, 5, NULL, 0), 3);
     near(silt_outline_distance(&box, (double[2]){0.5, 0}), 0.3, 1e-15, "distance");
@@ -725,7 +725,8 @@ static void test_outline_nodes(void **unused) {
 static void test_clumps(void **unused) {
     (void)unused;
     const silt_shape kind[3] = {SHAPE_BOX, SHAPE_DISC, SHAPE_TEMPLE};
-    const double radius[3] = {0.06, 0.06, 0.03}, height[3] = {0.3, 0, 0};
+    // 0.06 of the width, of the disc's polygon
+    const double radius[3] = {0.06, 0.06 * sqrt(M_PI / 64 / sin(M_PI / 64)), 0.03}, height[3] = {0.3, 0, 0};
     // smooth: the scallop between spheres spacing apart, r (1 - sqrt(1 - (s/2)^2)); corner of 90 degrees: 0.414 of the
     // smallest
     const double spacing[3] = {0.4, 0.3, 0.2};

@@ -151,7 +151,7 @@ static bits take_bits(const silt_run *run) {
     return b;
 }
 
-// thrown: what fails is not the water's step but the force on a body, which any force would throw out of the scene
+// thrown: what fails is not the water's step but the force on a body, which would throw it out of the scene
 static void fails_and_leaves(const char *path, int n_set, const char *const *set, int before, int after, bool thrown) {
     silt_run run;
     silt_scene *scene;
@@ -159,11 +159,10 @@ static void fails_and_leaves(const char *path, int n_set, const char *const *set
     begin(&run, &scene, path, n_set, set);
     steps(&run, before);
     const double dt = run.dt;
-    struct silt_body *body = thrown ? silt_coupling_dem.bodies(run.coupling)->body : NULL;
-    const double tolerance = scene->fluid.tolerance, mass = thrown ? body->mass : 0;
+    const double tolerance = scene->fluid.tolerance, carry = thrown ? run.body_carry[0][0] : 0;
     const int iterations = scene->fluid.iterations;
     if (thrown)
-        body->mass = 1e-30;
+        run.body_carry[0][0] = 1e9; // N s, that the water owes it
     else {
         // nothing can converge to this
         scene->fluid.tolerance = 1e-30;
@@ -192,7 +191,7 @@ static void fails_and_leaves(const char *path, int n_set, const char *const *set
     scene->fluid.tolerance = tolerance;
     scene->fluid.iterations = iterations;
     if (thrown)
-        body->mass = mass;
+        run.body_carry[0][0] = carry;
     steps(&run, after);
     const bits mended = take_bits(&run);
     end(&run, &scene);

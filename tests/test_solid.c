@@ -7,6 +7,7 @@
 // clang-format on
 #include "check.h"
 #include "../dem-coupling/form.h"
+#include "coupling.h"
 
 typedef struct moments {
     double volume, xx, yy, zz;
@@ -317,10 +318,55 @@ static void test_clump(void **state) {
     }
 }
 
+// ---------------------------------------------------------------- scenes that are refused when the surfaces are made
+
+#define SCENE                                                                                                          \
+    "silt: 1\ntime: {end: 1, output: 0.1}\ndimension: 3\ngravity: [0, 0, -9.81]\n"                                     \
+    "fluid: {density: 1000, viscosity: 0.001, size: 0.1, regions: [{box: [[0, 0, 0], [2, 1, 1]]}]}\n"                  \
+    "walls: [{box: [[0, 0, 0], [2, 1, 1]]}]\n"                                                                         \
+    "contact: {youngs_modulus: 1e7, poissons_ratio: 0.3, restitution: 0.5, friction: 0.5, rolling_friction: 0.1}\nbodies:\n"
+
+static void scene_refused(const char *bodies, const char *name, const char *word) {
+    static const char path[] = "test_solid_scene.yaml";
+    FILE *to = fopen(path, "w");
+    fprintf(to, "%s%s", SCENE, bodies);
+    fclose(to);
+    silt_scene *scene;
+    OK(silt_scene_read(path, 0, NULL, &scene, &error));
+    silt_walls walls = {0};
+    OK(silt_walls_create(&walls, scene, &error));
+    silt_coupling_def def = {.scene = scene, .walls = &walls, .worker = "none", .log = "none", .lo = {-1, -1, -1}, .hi = {3, 2, 2}};
+    silt_coupling *coupling = NULL;
+    error = (silt_error){0};
+    const silt_status status = silt_coupling_dem.open(&coupling, &def, &error);
+    if (status != SILT_INPUT)
+        fail_msg("status %d for %s: %s", status, bodies, error.text);
+    if (!strstr(error.text, name) || !strstr(error.text, word))
+        fail_msg("'%s' says nothing of '%s' or '%s'", error.text, name, word);
+    silt_walls_clear(&walls);
+    silt_scene_free(&scene);
+    remove(path);
+}
+
+static void test_scenes(void **state) {
+    (void)state;
+    scene_refused("  - {name: a, shape: box, at: [0.5, 0.5, 0.5], scale: 0.4, density: 700}\n"
+                  "  - {name: b, shape: sphere, at: [0.8, 0.5, 0.5], scale: 0.3, density: 700}\n", "body b", "overlapping body 'a'");
+    // one within the other
+    scene_refused("  - {name: a, shape: box, at: [0.5, 0.5, 0.5], scale: 0.6, density: 700}\n"
+                  "  - {name: b, shape: box, at: [0.5, 0.5, 0.5], scale: 0.3, density: 700}\n", "body b", "overlapping body 'a'");
+    scene_refused("  - {name: plate, shape: box, at: [0.5, 0.5, 0.5], scale: 0.6, height: 0.05, density: 700}\n", "body plate", "0.05 m thick");
+    scene_refused("  - {name: deep, shape: box, at: [0.5, 0.5, 0.1], scale: 0.4, density: 700}\n", "body deep", "behind a wall");
+    write_cube("test_solid_open.stl", 7, -1);
+    scene_refused("  - {name: cup, shape: surface, file: test_solid_open.stl, scale: 0.3, at: [0.5, 0.5, 0.5], density: 700}\n", "body cup", "open");
+    remove("test_solid_open.stl");
+}
+
 int main(void) {
     const struct CMUnitTest test[] = {
         cmocka_unit_test(test_formulas), cmocka_unit_test(test_prism), cmocka_unit_test(test_tetrapod), cmocka_unit_test(test_temple),
         cmocka_unit_test(test_files),    cmocka_unit_test(test_mesh),  cmocka_unit_test(test_clump),
+        cmocka_unit_test(test_scenes),
     };
     return cmocka_run_group_tests(test, NULL, NULL);
 }

@@ -5,10 +5,7 @@
 #define FLUID_WHOLE 2.5     // the same, in the mean, from which momentum and continuity are factored as one
 #define FLUID_SLOW 12        // passes after which stiff cells, few as they are, bring that too
 #define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
-#define EXPLICIT_SHARE 0.02 // of the water that may be too stiff for explicit viscosity: slivers
 #define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
-#define FLUID_SPRAY 5        // passes after which the worst node may lag behind the rest
-#define FLUID_NODE 0.25     // of h^D: the volume against which the continuity of a smaller node counts
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 #define FLUID_INNER 1e4     // accuracy of a pressure increment over that of the step, at least: refreshes are counted, so what an
@@ -21,7 +18,7 @@ void silt_fluid_clear(silt_fluid *f) {
     double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->start, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
                        f->level_force, f->bed_force, f->level_brake, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
-                       f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->pressure_new, f->v_start, f->normal, f->given, f->cg[0],
+                       f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->pressure_new, f->v_start, f->v_first, f->debt_first, f->normal, f->given, f->cg[0],
                        f->cg[1]};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
@@ -113,8 +110,12 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         SILT_RESERVE(f->level_brake, f->level_brake_capacity, n_node + 1);
         memset(f->level_force, 0, (size_t)(D * n_node) * sizeof(double));
     }
-    if (s->scene->fluid.volume_control)
+    if (s->scene->fluid.volume_control || s->body_velocity)
         SILT_RESERVE(f->shift, f->shift_capacity, D * n_node + 1);
+    if (s->body_velocity) {
+        SILT_RESERVE(f->v_first, f->v_first_capacity, D * n_node + 1);
+        SILT_RESERVE(f->debt_first, f->debt_first_capacity, n_node + 1);
+    }
     f->n_node = n_node;
     f->n_cell = n_cell;
 }
@@ -169,6 +170,8 @@ static void find_excess(silt_fluid *f, const silt_step *s, double stiff, const d
             a[D * i + d] = s->mesh->wet[i] && f->mass[i] > 0 ? a[D * i + d] / f->mass[i] : 0;
         // such a body force is loaded at the nodes, not as a P1 field: it has no excess, whatever holds the nodes
         silt_hold_project(f, i, a + D * i);
+        for (int d = 0; s->body_velocity && s->nodes->kind[i] == NODE_BODY && d < D; d++)
+            a[D * i + d] = (f->w[D * i + d] - v[D * i + d]) / theta_dt;
         if (s->scene->fluid.force.kind != FORMULA_NONE) {
             double b[3];
             body_force(f, s, i, b);
@@ -203,6 +206,8 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
         out[k] += f->level_force[k];
     for (int k = 0; f->bed_force && k < D * f->n_node; k++)
         out[k] += f->bed_force[k];
+    for (int k = 0; s->gap_force && k < D * f->n_node; k++)
+        out[k] += s->gap_force[k];
     if (s->scene->fluid.surface_tension > 0)
         silt_tension_force(s->mesh, f->x_mid, s->scene->fluid.surface_tension, out);
     if (s->pockets)
@@ -282,63 +287,6 @@ static silt_status velocity_star(silt_fluid *f, const silt_step *s, bool viscid,
     return SILT_OK;
 }
 
-/** what continuity lacks in a chunk of the nodes */
-typedef struct lack {
-    double most, all, volume; // largest share of a node's volume, m3 of all, m3
-    int node;                 // that has the largest
-} lack;
-
-static lack lack_of(const silt_fluid *f, const silt_step *s, int first, int last) {
-    const bool consistent = s->scene->fluid.pressure == PRESSURE_CONSISTENT;
-    lack l = {0};
-    for (int j = first; j < last; j++) {
-        if (!s->mesh->wet[j] || (!consistent && s->mesh->surface[j]) || f->mobile[j] != 1)
-            continue;
-        const double h = silt_node_h(s->nodes, j, s->scene->fluid.size);
-        const double share = fabs(f->residual[j]) * s->dt / silt_max(f->volume[j], FLUID_NODE * (f->dim == 3 ? h * h * h : h * h));
-        if (share > l.most || !isfinite(share)) {
-            l.most = share;
-            l.node = j;
-        }
-        l.all += fabs(f->residual[j]) * s->dt;
-        l.volume += f->volume[j];
-    }
-    return l;
-}
-
-// largest share of its volume that a node would gain or lose in the step; spray counts as a quarter of a cell. @return that node
-static int worst_residual(silt_fluid *f, const silt_step *s) {
-    const int n = f->n_node;
-    lack part[CHUNK_MOST], all = {0};
-    SILT_PARALLEL(n)
-    for (int c = 0; c < silt_chunks(n); c++)
-        part[c] = lack_of(f, s, silt_chunk_first(n, c), silt_chunk_first(n, c + 1));
-    for (int c = 0; c < silt_chunks(n); c++) {
-        if (part[c].most > all.most || !isfinite(part[c].most)) {
-            all.most = part[c].most;
-            all.node = part[c].node;
-        }
-        all.all += part[c].all;
-        all.volume += part[c].volume;
-    }
-    f->worst = all.most;
-    f->lacking = all.volume > 0 ? all.all / all.volume : 0;
-    return all.node;
-}
-
-// what continuity lacks with f->star. @return the node that lacks most
-static int star_continuity(silt_fluid *f, const silt_step *s, const double *p) {
-    const double *v = f->star;
-    if (f->shift) {
-        SILT_PARALLEL(f->n_node)
-        for (int k = 0; k < f->dim * f->n_node; k++)
-            f->scratch[k] = f->star[k] + f->shift[k];
-        v = f->scratch;
-    }
-    silt_assemble_continuity(f, s->mesh, s->drag, f->rate, v, p);
-    return worst_residual(f, s);
-}
-
 void silt_fluid_correct(silt_fluid *f, const silt_step *s, const double *q, double *v) {
     const int D = f->dim;
     memset(f->scratch, 0, (size_t)D * (size_t)f->n_node * sizeof(double));
@@ -379,6 +327,11 @@ static double kinetic_energy(const silt_fluid *f, const silt_step *s, const doub
     return sum;
 }
 
+// nodes of bodies start with the bodies' velocity, and not with that of the step
+static bool own_start(const silt_step *s, int i) {
+    return s->body_velocity && s->nodes->kind[i] == NODE_BODY;
+}
+
 // The trapezoidal rule keeps whatever divergence the first velocity has and turns its sign from step to step: remeshing and
 // the mesh's motion put some in, so it is taken out first, on the mesh where the nodes are (projected Runge-Kutta method for
 // index-2 systems: Ascher and Petzold, SIAM J. Numer. Anal. 28, 1991).
@@ -387,7 +340,7 @@ static silt_status project_start(silt_fluid *f, const silt_step *s, const double
     double *v = s->nodes->v;
     silt_assemble_geometry(f, s, 0);
     for (int i = 0; i < f->n_node; i++)
-        if (s->mesh->wet[i])
+        if (s->mesh->wet[i] && !own_start(s, i))
             silt_hold_turn(f, i, v + D * i);
     silt_assemble_projection(f, s->mesh, p);
     const double before = kinetic_energy(f, s, v);
@@ -398,7 +351,7 @@ static silt_status project_start(silt_fluid *f, const silt_step *s, const double
     f->projected = before - kinetic_energy(f, s, v);
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i])
-            memcpy(f->w + D * i, v + D * i, (size_t)D * sizeof(double));
+            memcpy(f->w + D * i, (own_start(s, i) ? f->given : v) + D * i, (size_t)D * sizeof(double));
     return SILT_OK;
 }
 
@@ -410,10 +363,14 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
     for (int i = 0; i < f->n_node && !any; i++)
         any = f->rate[i] != 0;
     memset(f->shift, 0, (size_t)(D * f->n_node) * sizeof *f->shift);
+    for (int i = 0; i < f->n_node && s->body_shift; i++)
+        for (int d = 0; s->nodes->kind[i] == NODE_BODY && s->mesh->wet[i] && d < D; d++) {
+            f->shift[D * i + d] = s->body_shift[D * i + d];
+            any |= f->shift[D * i + d] != 0;
+        }
     for (int pass = 0; pass < 2 && any; pass++) {
-        memset(pass ? f->increment : f->residual, 0, (size_t)f->n_node * sizeof(double));
-        if (pass) // at first there is none
-            silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
+        memset(f->increment, 0, (size_t)f->n_node * sizeof(double));
+        silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
         for (int i = 0; i < f->n_node; i++)
             f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
         SILT_TRY(pressure_increment(f, s, false, D == 3 ? FLUID_PAID : 0.03, err));
@@ -477,6 +434,8 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
 
     for (int k = 0; f->bed_force && k < D * f->n_node; k++)
         out[k] += s->mesh->wet[k / D] ? f->bed_force[k] : 0;
+    for (int k = 0; s->gap_force && k < D * f->n_node; k++)
+        out[k] += s->mesh->wet[k / D] ? s->gap_force[k] : 0;
     // the law of the wall brakes what is free
     for (int k = 0; k < f->law.n_point; k++) {
         const int i = f->law.point[k].node;
@@ -502,21 +461,6 @@ static silt_status correct_stiff(silt_fluid *f, silt_error *err) {
     for (int i = 0; i < f->n_node; i++)
         f->increment[i] += f->scratch[i];
     return status;
-}
-
-// A node that came within the courant number and leaves by more than a cell: the step was too long for what happened in it. Where
-// no smaller step will follow, over ten cells: no result after that is worth having.
-static silt_status astray_node(const silt_fluid *f, const silt_step *s, silt_error *err) {
-    const int D = f->dim;
-    const double most = f->last_try ? 10 : 1.5;
-    for (int i = 0; i < f->n_node; i++) {
-        const double h = silt_node_h(s->nodes, i, s->scene->fluid.size), way = silt_length(D, f->w + D * i) * s->dt;
-        if (!s->mesh->wet[i] || way < most * h || (!f->last_try && silt_length(D, s->nodes->v + D * i) * s->dt > h))
-            continue;
-        return silt_fail(err, SILT_FAILED, "a node at (%g, %g) would be thrown over %.3g cells in a step", s->nodes->x[D * i],
-                         s->nodes->x[D * i + 1], way / h);
-    }
-    return SILT_OK;
 }
 
 // The trapezoidal rule turns the sign of modes that viscosity brings to rest within the step and hardly damps them: where
@@ -548,55 +492,22 @@ static silt_status correct_whole(silt_fluid *f, const silt_step *s, silt_error *
     return SILT_OK;
 }
 
-// Explicit viscosity: f->stand holds the nodes that it would make unstable (point by point implicit, the fixed point is the same);
-// a step in which that is more than what stands in slivers is too long. Two passes are the midpoint rule, which stands steps of 2
-// over the largest eigenvalue of M^-1 K: at most twice the largest share of the diagonal (square lattice; 1.5 on even triangles).
-static silt_status explicit_limit(silt_fluid *f, const silt_step *s, silt_error *err) {
-    double held = 0, all = 0;
-    memset(f->stand, 0, (size_t)f->n_node * sizeof *f->stand);
-    silt_assemble_viscous_diagonal(f, s->mesh, f->stand);
-    for (int i = 0; i < f->n_node; i++) {
-        f->stand[i] = silt_max(0, 2 * f->stand[i] - f->inertia[i]);
-        all += s->mesh->wet[i] ? f->volume[i] : 0;
-        held += f->stand[i] > 0 && f->hold[i] != HOLD_ALL ? f->volume[i] : 0;
-    }
-    if (held <= EXPLICIT_SHARE * all)
-        return SILT_OK;
-    return silt_fail(err, SILT_FAILED, "a step of %.3g s is too long for explicit viscosity (fluid.scheme: implicit knows no limit)", s->dt);
+// once a step, before its first iteration: theta, and which nodes have a say
+static silt_status step_kind(silt_fluid *f, const silt_step *s, double *p, silt_error *err) {
+    if (choose_theta(f, s))
+        silt_assemble_geometry(f, s, s->dt);
+    if (s->scene->fluid.scheme == SCHEME_FRACTIONAL)
+        SILT_TRY(silt_explicit_limit(f, s, err));
+    silt_mobile_find(f, s->mesh, p);
+    silt_spray_find(f, s, p);
+    return SILT_OK;
 }
 
-// the largest way that an iterate's change of velocity makes in the step, over the local size: continuity does not see what swirls
-static double swirl(const silt_fluid *f, const silt_step *s) {
-    double most = 0;
-    for (int i = 0; i < f->n_node; i++)
-        for (int d = 0; d < f->dim && s->mesh->wet[i]; d++)
-            most = silt_max(most, fabs(f->star[f->dim * i + d] - f->w[f->dim * i + d]) / silt_node_h(s->nodes, i, s->scene->fluid.size));
-    return most * s->dt;
-}
-
-// fluid.tolerance is a share of a node's volume in a step of the usual length: many short steps shall not gain more than a few long
-// ones, or still water starts to swirl. @return what to multiply it by
-static double strictness(const silt_fluid *f, const silt_step *s) {
-    const double h = s->scene->fluid.size;
-    double square = h * silt_length(3, s->scene->gravity);
-    for (int i = 0; i < f->n_node; i++)
-        if (s->mesh->wet[i])
-            square = silt_max(square, silt_dot(f->dim, s->nodes->v + f->dim * i, s->nodes->v + f->dim * i));
-    const double fastest = sqrt(square);
-    const double least = silt_clamp(1e-12 / s->scene->fluid.tolerance, 0.01, 1); // rounding
-    return fastest > 0 && !f->last_try ? silt_clamp(s->dt * fastest / (0.5 * h), least, 1) : 1;
-}
-
-// Small cells of spray turn while they are solved, and are not waited for when all that is lacking is little
-static bool spray_lags(const silt_fluid *f, double tolerance) {
-    return f->iterations >= FLUID_SPRAY && f->lacking < 0.01 * tolerance && f->worst < 1e3 * tolerance;
-}
-
-static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, silt_error *err) {
+static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, bool again, silt_error *err) {
     const silt_fluid_def *def = &s->scene->fluid;
     const bool consistent = def->pressure == PRESSURE_CONSISTENT;
     const int D = f->dim;
-    const double strict = strictness(f, s);
+    const double strict = silt_strictness(f, s);
     const bool direct = D == 2 && consistent && def->scheme == SCHEME_IMPLICIT; // momentum and continuity can be factored as one
     const size_t bytes = (size_t)D * (size_t)f->n_node * sizeof(double);
     double before = HUGE_VAL;
@@ -612,20 +523,19 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
             SILT_CLOCKED(coupling, s->drag->update(s->drag->self, f->w, p, s->dt));
         resist(f, s);
         if (f->iterations == 0) {
-            if (choose_theta(f, s))
-                silt_assemble_geometry(f, s, s->dt);
-            if (def->scheme == SCHEME_FRACTIONAL)
-                SILT_TRY(explicit_limit(f, s, err));
-            silt_mobile_find(f, s->mesh, p);
-            silt_spray_find(f, s, p);
+            if (!again)
+                SILT_TRY(step_kind(f, s, p, err));
             // in the plane a stiff cell here and there is no reason
             whole = direct && mean_stiffness(f, s) > FLUID_WHOLE;
             split = !direct && stiffness(f, s) > FLUID_STIFF;
-            SILT_CLOCKED(matrix, status = silt_pressure_factor(f->pressure, f, s, err));
+            if (!again)
+                SILT_CLOCKED(matrix, status = silt_pressure_factor(f->pressure, f, s, err));
+            else
+                status = SILT_OK;
             SILT_TRY(status);
             if (split)
                 SILT_TRY(prepare_stiff(f, s, &twofold, err));
-            if (f->theta < 0.75 && !s->drag) {
+            if (f->theta < 0.75 && !s->drag && !again) {
                 // a first pressure, nought, does not balance the smoothing of the potential
                 double *potential = f->potential;
                 f->potential = first ? NULL : potential;
@@ -660,22 +570,22 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
         const double drop = def->scheme == SCHEME_IMPLICIT && before > 10 * strict * def->tolerance ? worth : 0;
         bool solved;
         SILT_TRY(velocity_star(f, s, stiff > 0, drop, &solved, err));
-        int worst_node = star_continuity(f, s, p);
-        if (!solved && (f->worst <= strict * def->tolerance || spray_lags(f, strict * def->tolerance))) {
+        int worst_node = silt_star_continuity(f, s, p);
+        if (!solved && (f->worst <= strict * def->tolerance || silt_spray_lags(f, strict * def->tolerance))) {
             SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->star));
             SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, 0, f->star, &solved, err));
             SILT_TRY(status);
-            worst_node = star_continuity(f, s, p);
+            worst_node = silt_star_continuity(f, s, p);
         }
         const double *place = s->nodes->x + D * worst_node;
         if (!isfinite(f->worst))
             return silt_fail(err, SILT_FAILED, "the velocity is not finite near (%g, %g)", place[0], place[1]);
         const bool passed = def->scheme == SCHEME_IMPLICIT || stiff == 0 || f->iterations > 0;
-        const bool fine = passed && f->worst <= (first ? 0.1 : 1) * strict * def->tolerance && (!first || swirl(f, s) <= def->tolerance);
+        const bool fine = passed && f->worst <= (first ? 0.1 : 1) * strict * def->tolerance && (!first || silt_swirl(f, s) <= def->tolerance);
         // at the end of the iterations a small residual is accepted; a first pressure takes longer to meet its projection
-        if (fine || (!first && spray_lags(f, strict * def->tolerance)) || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
+        if (fine || (!first && silt_spray_lags(f, strict * def->tolerance)) || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
             memcpy(f->w, f->star, bytes);
-            return astray_node(f, s, err);
+            return silt_astray_node(f, s, err);
         }
         if (f->iterations >= most && f->iterations % 4 == 0 && silt_debts_relent(f))
             continue;
@@ -722,6 +632,42 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, s
     }
 }
 
+// velocity, pressure and debts of the step, or all as before
+static silt_status fluid_accept(silt_fluid *f, const silt_step *s, silt_status status) {
+    const silt_fluid_def *def = &s->scene->fluid;
+    silt_nodes *nodes = s->nodes;
+    const int D = f->dim;
+    const double *p = f->pressure_new, *v = f->v_start;
+    if (status != SILT_OK) {
+        memcpy(nodes->v, v, (size_t)D * (size_t)f->n_node * sizeof(double));
+        return status;
+    }
+    reactions(f, s, p);
+    memset(f->impulse, 0, sizeof f->impulse);
+    for (int i = 0; i < f->n_node; i++)
+        for (int d = 0; d < D && s->mesh->wet[i]; d++)
+            f->impulse[d] += f->mass[i] * (nodes->v[D * i + d] - v[D * i + d]);
+    f->solved_volume = 0;
+    for (int i = 0; i < f->n_node; i++) {
+        nodes->p[i] = p[i];
+        f->solved_volume += f->residual[i] * s->dt;
+        const double answered = (f->rate[i] + (f->mobile[i] != 1 ? f->withheld[i] : 0)) * s->dt;
+        nodes->debt[i] -= answered;
+        if (def->pressure == PRESSURE_LAPLACIAN && s->mesh->surface[i]) // no continuity there: what the node gained
+            nodes->debt[i] -= f->residual[i] * s->dt;
+        f->given_back += answered;
+        if (!s->mesh->wet[i])
+            continue;
+        // what is held keeps its velocity, the rest goes on to the end of the step
+        for (int d = 0; d < D; d++)
+            nodes->v[D * i + d] += (f->w[D * i + d] - nodes->v[D * i + d]) / f->theta;
+        // on a bent wall the velocity turns on: contact takes it along the wall
+        if (!own_start(s, i) && !(f->wall_normals.n_row && f->wall_normals.row[i] >= 0 && f->hold[i] == HOLD_NORMAL))
+            silt_hold_impose(f, i, nodes->v + D * i);
+    }
+    return SILT_OK;
+}
+
 silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) {
     const silt_fluid_def *def = &s->scene->fluid;
     silt_nodes *nodes = s->nodes;
@@ -729,6 +675,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     silt_parts_make(&f->parts, s->mesh);
     const int D = f->dim;
     f->seep = s->seep && s->seep->n_water ? s->seep : NULL;
+    silt_stiff_end(f->stiff);
     if (!f->pressure)
         f->pressure = silt_pressure_create();
     f->theta = def->theta;
@@ -761,32 +708,32 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     for (int i = 0; i < f->n_node; i++)
         // with the Laplacian the surface's pressure is prescribed
         p[i] = s->mesh->wet[i] && !(def->pressure == PRESSURE_LAPLACIAN && s->mesh->surface[i]) ? nodes->p[i] : 0;
-    const silt_status status = s->mesh->n_cell ? fluid_iterate(f, s, p, err) : SILT_OK;
-    silt_stiff_end(f->stiff);
-    if (status == SILT_OK) {
-        reactions(f, s, p);
-        for (int i = 0; i < f->n_node; i++)
-            for (int d = 0; d < D && s->mesh->wet[i]; d++)
-                f->impulse[d] += f->mass[i] * (nodes->v[D * i + d] - v[D * i + d]);
-        f->solved_volume = 0;
-        for (int i = 0; i < f->n_node; i++) {
-            nodes->p[i] = p[i];
-            f->solved_volume += f->residual[i] * s->dt;
-            const double answered = (f->rate[i] + (f->mobile[i] != 1 ? f->withheld[i] : 0)) * s->dt;
-            nodes->debt[i] -= answered;
-            if (def->pressure == PRESSURE_LAPLACIAN && s->mesh->surface[i]) // no continuity there: what the node gained
-                nodes->debt[i] -= f->residual[i] * s->dt;
-            f->given_back += answered;
-            if (!s->mesh->wet[i])
-                continue;
-            // what is held keeps its velocity, the rest goes on to the end of the step
-            for (int d = 0; d < D; d++)
-                nodes->v[D * i + d] += (f->w[D * i + d] - nodes->v[D * i + d]) / f->theta;
-            // on a bent wall the velocity turns on: contact takes it along the wall
-            if (!(f->wall_normals.n_row && f->wall_normals.row[i] >= 0 && f->hold[i] == HOLD_NORMAL))
-                silt_hold_impose(f, i, nodes->v + D * i);
-        }
+    const silt_status status = s->mesh->n_cell ? fluid_iterate(f, s, p, false, err) : SILT_OK;
+    if (s->body_velocity) {
+        memcpy(f->v_first, nodes->v, (size_t)D * (size_t)f->n_node * sizeof(double));
+        memcpy(f->debt_first, nodes->debt, (size_t)f->n_node * sizeof(double));
+        f->given_first = f->given_back;
     } else
-        memcpy(nodes->v, v, (size_t)D * (size_t)f->n_node * sizeof(double));
-    return status;
+        silt_stiff_end(f->stiff);
+    return fluid_accept(f, s, status);
+}
+
+silt_status silt_fluid_again(silt_fluid *f, const silt_step *s, silt_error *err) {
+    silt_nodes *nodes = s->nodes;
+    const int D = f->dim;
+    memcpy(nodes->v, f->v_first, (size_t)D * (size_t)f->n_node * sizeof(double));
+    memcpy(nodes->debt, f->debt_first, (size_t)f->n_node * sizeof(double));
+    f->given_back = f->given_first;
+    for (int i = 0; i < f->n_node; i++)
+        for (int d = 0; nodes->kind[i] == NODE_BODY && d < D; d++) {
+            f->given[D * i + d] = s->body_velocity[D * i + d];
+            f->w[D * i + d] = s->mesh->wet[i] ? f->given[D * i + d] : 0;
+        }
+    const int before = f->iterations;
+    const silt_status status = s->mesh->n_cell ? fluid_iterate(f, s, f->pressure_new, true, err) : SILT_OK;
+    f->iterations += before;
+    silt_stiff_end(f->stiff);
+    if (s->drag && s->drag->update && status == SILT_OK)
+        s->drag->update(s->drag->self, f->w, f->pressure_new, s->dt);
+    return fluid_accept(f, s, status);
 }

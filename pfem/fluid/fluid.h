@@ -1,6 +1,6 @@
 /** @file fluid.h
  * One step of the water: momentum, pressure, correction on the midpoint mesh (docs/method.md, "Fluid"), in 2-D and 3-D.
- * Rooms: fluid.c the step, hold.c what surroundings hold, geometry.c shapes of the cells, assemble.c integrals over them,
+ * Rooms: fluid.c the step, converge.c how far it is, impedance.c what it answers to rigid bodies, hold.c what surroundings hold, geometry.c shapes of the cells, assemble.c integrals over them,
  * tension.c the surface's pull, momentum.c the viscous system, pressure.c the pressure system, space.c and coarse.c that of 3-D,
  * stiff.c both at once where viscosity is stiff, debt.c volume that is owed and water that cannot keep its volume.
  */
@@ -28,12 +28,15 @@ typedef struct silt_step {
     silt_seep *seep;             // prepared for this step; NULL where the bed lets no water through
     silt_nodes *nodes;
     double time, dt;             // s, start and length
+    // dim per node, m/s, of nodes on bodies: velocity of the momentum, and what carries their places beside it; NULL: the nodes' own, none
+    const double *body_velocity, *body_shift;
+    const double *gap_force; // dim per node, N, of the water in gaps too narrow for cells on what is at their mouths; NULL: none
 } silt_step;
 
 /** working space and results of a step; arrays grow only */
 typedef struct silt_fluid {
     int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity,
-        potential_capacity, stand_capacity, bed_force_capacity, still_capacity, level_capacity, level_brake_capacity;
+        potential_capacity, stand_capacity, v_first_capacity, debt_first_capacity, bed_force_capacity, still_capacity, level_capacity, level_brake_capacity;
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
@@ -68,6 +71,8 @@ typedef struct silt_fluid {
     silt_wall_normals wall_normals; // owned, of nodes on bent walls
     double *cg[3];        // dim per node, working space of the momentum solver and others: two owned, the third lies in reaction
     double *pressure_new, *v_start; // owned, 1 and dim per node: kept apart until the step is accepted
+    double *v_first, *debt_first; // owned, dim and 1 per node: what the step began with once debts had spread and v was free of divergence; NULL without bodies
+    double given_first;   // m3
     int *piece, *walk;    // owned, per node: lowest node of its piece of water; working space
     uint8_t *closed;      // owned, see silt_closed_pieces
     int64_t piece_revision; // of the mesh that these pieces belong to
@@ -105,6 +110,10 @@ void silt_fluid_clear(silt_fluid *fluid);
  * positions move with, debts are paid by what was asked; positions are untouched. On failure the nodes are as before.
  * Errors: SILT_FAILED with what did not converge and where. */
 silt_status silt_fluid_step(silt_fluid *fluid, const silt_step *step, silt_error *err);
+/** The step that was just solved once more, for other motions of bodies than those that it was solved with (step->body_velocity,
+ * step->body_shift): from where it ended, with its factor, theta and debts. To be used only after silt_fluid_step with
+ * body_velocity. On failure the nodes are as before the step. */
+silt_status silt_fluid_again(silt_fluid *fluid, const silt_step *step, silt_error *err);
 /** component k of the velocity that the mesh moves with: w, the debts' shift, less a belt's own motion; none on the bed */
 static inline double silt_mesh_velocity(const silt_fluid *f, int k) {
     if (f->still && f->still[k / f->dim])
@@ -128,6 +137,15 @@ static inline void silt_hold_project(const silt_fluid *f, int i, double *v) { //
 }
 /** v with its held components replaced by the given ones */
 void silt_hold_impose(const silt_fluid *fluid, int i, double *v);
+
+// converge.c ---------------------------------------------------------------------------------------------
+/** what continuity lacks with fluid->star: residual, worst, lacking. @return the node that lacks most */
+int silt_star_continuity(silt_fluid *fluid, const silt_step *step, const double *p);
+silt_status silt_astray_node(const silt_fluid *fluid, const silt_step *step, silt_error *err);
+silt_status silt_explicit_limit(silt_fluid *fluid, const silt_step *step, silt_error *err);
+double silt_swirl(const silt_fluid *fluid, const silt_step *step);
+double silt_strictness(const silt_fluid *fluid, const silt_step *step);
+bool silt_spray_lags(const silt_fluid *fluid, double tolerance);
 
 // level.c -------------------------------------------------------------------------------------------------
 bool silt_levels_any(const silt_scene *scene);
@@ -221,6 +239,13 @@ silt_status silt_pressure_solve_stiff(silt_pressure *pressure, const double *rig
 /** forgets factors, so that a resumed run and one that went on hold the same */
 void silt_pressure_forget(silt_pressure *pressure);
 
+
+// impedance.c ---------------------------------------------------------------------------------------------
+/** What the step that was just solved answers to a change of its velocity on held nodes: motion, dim per node, nought where nothing
+ * changes. Linear: the matrix of the step's end, whose momentum and continuity are solved for it. reaction, dim per node: change of
+ * the forces that hold the held nodes, N per m/s; pressure, 1 per node: change of it. Takes fluid->reaction as working space. */
+silt_status silt_fluid_mode(silt_fluid *fluid, const silt_step *step, const double *motion, double *reaction, double *pressure,
+                            silt_error *err);
 
 // fluid.c
 /** v += P G q/inertia */

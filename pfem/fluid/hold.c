@@ -215,7 +215,9 @@ void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
         double vector[3] = {0}, given[3];
         f->hold[i] = HOLD_ALL;
         // bodies and inlets move as they were told, walls as they do, the bed not at all
-        if (nodes->kind[i] == NODE_BODY || nodes->kind[i] == NODE_INLET || nodes->kind[i] == NODE_CORNER)
+        if (nodes->kind[i] == NODE_BODY && s->body_velocity)
+            memcpy(f->given + D * i, s->body_velocity + D * i, (size_t)D * sizeof(double));
+        else if (nodes->kind[i] == NODE_BODY || nodes->kind[i] == NODE_INLET || nodes->kind[i] == NODE_CORNER)
             memcpy(f->given + D * i, nodes->v + D * i, (size_t)D * sizeof(double));
         else if (nodes->kind[i] == NODE_FLUID && nodes->wall[i][0] < 0)
             f->hold[i] = HOLD_FREE;

@@ -1,6 +1,7 @@
 // keeps the water's mesh on the bed and, in space, on bodies: edges (in space faces) of theirs that the triangulation has lost
 
 #include "remesh.h"
+#include "solid.h"
 
 // A node close over a face of the bed or a body is joined by the triangulation to nodes on its other side, right through it. Such cells are
 // no water, and a hollow without pressure would stay on the face. It is filled by cells between faces and node.
@@ -91,6 +92,81 @@ static void fit_bodies(fit *f, const silt_cell_set *set, const silt_body_state *
         first += body->n_point;
     }
     free(node);
+}
+
+// the cell behind one of the listed facets, and its node that is not on it; -1: there is no such facet
+static int facet_cell(const silt_mesh *mesh, const silt_cell_set *set, const int *behind, int a, int b, int c, int *apex) {
+    const int key[4] = {a, b, c, -1}, k = silt_cell_set_find(set, key);
+    if (k < 0)
+        return -1;
+    for (int n = 0; n < 4; n++) {
+        const int i = mesh->cell[behind[k]][n];
+        *apex = i == a || i == b || i == c ? *apex : i;
+    }
+    return behind[k];
+}
+
+// An edge A D between the faces A D C and D A B of a body that stands out, with a node W close over it: the triangulation has the cells
+// A B C W and B D C W, which go through the body, in place of A D C W and D A B W.
+static void fit_ridges(silt_draft *draft, const silt_nodes *nodes, const silt_body_state *bodies, double size) {
+    silt_mesh *mesh = draft->mesh;
+    int(*facet)[4] = NULL, *behind = NULL, n = 0, capacity = 0, behind_capacity = 0, exchanged = 0, first = 0;
+    for (int e = 0; e < mesh->n_cell; e++)
+        for (int a = 0; a < 4; a++) {
+            int own[4] = {-1, -1, -1, -1};
+            if (mesh->across[e][a] >= 0)
+                continue;
+            silt_cell_facet(3, mesh->cell[e], a, own);
+            const int of = fit_owner(nodes, own[0]);
+            if (of < 0 || fit_owner(nodes, own[1]) != of || fit_owner(nodes, own[2]) != of)
+                continue;
+            SILT_RESERVE(facet, capacity, n + 1);
+            SILT_RESERVE(behind, behind_capacity, n + 1);
+            memcpy(facet[n], own, sizeof own);
+            behind[n++] = e;
+        }
+    silt_cell_set set;
+    silt_cell_set_create(&set, nodes->count, n, (const int(*)[4])facet);
+    int *node = fit_body_nodes(nodes, bodies);
+    for (int b = 0; b < bodies->count; first += bodies->body[b++].n_point) {
+        const silt_solid *solid = bodies->body[b].solid;
+        for (int f = 0; solid && f < solid->n_face; f++)
+            for (int k = 0; k < 3; k++) {
+                const int g = solid->beside[f][k], *at = solid->face[f], *other = solid->face[g];
+                const int m = other[0] != at[k] && other[0] != at[(k + 1) % 3] ? 0 : other[1] != at[k] && other[1] != at[(k + 1) % 3] ? 1 : 2;
+                const int A = node[first + at[k]], D = node[first + at[(k + 1) % 3]], C = node[first + at[(k + 2) % 3]], B = node[first + other[m]];
+                int apex[4] = {-1, -1, -1, -1};
+                if (g < f || A < 0 || B < 0 || C < 0 || D < 0 || facet_cell(mesh, &set, behind, A, D, C, &apex[2]) >= 0 ||
+                    facet_cell(mesh, &set, behind, D, A, B, &apex[3]) >= 0)
+                    continue;
+                const int e = facet_cell(mesh, &set, behind, A, B, C, &apex[0]), o = facet_cell(mesh, &set, behind, B, D, C, &apex[1]);
+                if (e < 0 || o < 0 || e == o || apex[0] != apex[1])
+                    continue;
+                const int fresh[2][4] = {{A, D, C, apex[0]}, {D, A, B, apex[0]}}, old[2] = {e, o};
+                const double h = silt_node_h(nodes, apex[0], size);
+                silt_cell_shape shape[2];
+                double corner[12];
+                bool sound = true;
+                for (int c = 0; c < 2; c++) {
+                    silt_cell_corners(mesh, nodes->x, fresh[c], corner);
+                    shape[c] = silt_cell_measure(3, corner);
+                    sound &= shape[c].volume > 0 && shape[c].height > FIT_FLAT * h;
+                }
+                for (int c = 0; c < 2 && sound; c++) {
+                    memcpy(mesh->cell[old[c]], fresh[c], sizeof fresh[c]);
+                    draft->before[old[c]] = -2;
+                    draft->quality[old[c]] = shape[c].height / h;
+                    exchanged++;
+                }
+            }
+    }
+    silt_cell_set_clear(&set);
+    free(facet);
+    free(behind);
+    free(node);
+    if (exchanged)
+        silt_cells_across(3, nodes->count, mesh->n_cell, (const int(*)[4])mesh->cell, mesh->across);
+
 }
 
 // free facets at the bed and bodies, and which of their faces are facets of the water
@@ -247,6 +323,8 @@ int silt_mesh_fit(silt_draft *draft, const silt_nodes *nodes, const silt_barrier
     }
     if (!bed && !(barrier->bodies && barrier->bodies->count))
         return 0;
+    if (barrier->bodies && barrier->bodies->count)
+        fit_ridges(draft, nodes, barrier->bodies, size);
     fit f = {.draft = draft, .nodes = nodes};
     const int before = draft->mesh->n_cell;
     fit_collect(&f, barrier);

@@ -134,6 +134,18 @@ static void summary_print(FILE *to, const silt_view *view, const silt_summary *s
     silt_json_number(to, "worst_volume_error", summary->worst_volume_error, ",\n  ");
     silt_json_number(to, "worst_sediment_error", summary->worst_sediment_error, ",\n  ");
     silt_json_number(to, "worst_momentum_error", summary->worst_momentum_error, ",\n");
+    fputs("  \"bodies\": [", to);
+    for (int i = 0; view->bodies && i < view->bodies->count; i++) {
+        const struct silt_body *b = &view->bodies->body[i];
+        fprintf(to, "%s\n    {\"name\": ", i ? "," : "");
+        silt_json_text(to, scene->body[i].name);
+        fputs(", ", to);
+        silt_json_number(to, "volume", b->volume, ", ");
+        silt_json_number(to, "mass", b->mass, ", ");
+        fprintf(to, "\"spheres\": %d, ", b->n_sphere);
+        silt_json_number(to, "clump_error", b->clump_error, "}");
+    }
+    fprintf(to, "%s],\n", view->bodies && view->bodies->count ? "\n  " : "");
     summary_machine(to);
     summary_checks(to, scene, check);
     fputs("}\n", to);

@@ -162,6 +162,7 @@ void silt_run_balance(silt_run *run) {
     ledger->momentum_error = fluid->momentum_scale > 0 ? fluid->momentum_residual / fluid->momentum_scale : 0;
     if (!run->coupling)
         return;
+    ledger->momentum_error = silt_max(ledger->momentum_error, run->body_error);
     silt_exchanged exchanged;
     silt_coupling_dem.exchanged(run->coupling, &exchanged);
     double open[3] = {0};

@@ -216,7 +216,15 @@ static silt_status main_report(const main_arguments *a, silt_error *err) {
 }
 
 static silt_status main_info(const main_arguments *a, silt_error *err) {
-    return silt_info(a->path, stdout, err);
+    SILT_TRY(silt_info(a->path, stdout, err));
+    struct stat file;
+    if (stat(a->path, &file) != 0 || S_ISDIR(file.st_mode))
+        return SILT_OK;
+    silt_scene *scene = NULL;
+    SILT_TRY(silt_scene_read(a->path, 0, NULL, &scene, err));
+    const silt_status status = scene->n_body ? silt_coupling_dem.describe(scene, stdout, err) : SILT_OK;
+    silt_scene_free(&scene);
+    return status;
 }
 
 static silt_status main_bench(const main_arguments *a, silt_error *err) {

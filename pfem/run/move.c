@@ -32,16 +32,7 @@ void silt_run_prescribe(silt_run *run) {
                 v[d] = factor * inlet->velocity[d];
         } else if (nodes->kind[i] == NODE_BODY && bodies) {
             const struct silt_body *body = &bodies->body[nodes->owner[i]];
-            const double *x = nodes->x + D * i;
-            if (D == 3)
-                for (int d = 0; d < 3; d++) {
-                    const int p = (d + 1) % 3, q = (d + 2) % 3;
-                    v[d] = body->v[d] + body->w[p] * (x[q] - body->x[q]) - body->w[q] * (x[p] - body->x[p]);
-                }
-            else {
-                v[0] = body->v[0] - body->w[2] * (x[1] - body->x[1]);
-                v[1] = body->v[1] + body->w[2] * (x[0] - body->x[0]);
-            }
+            silt_run_body_velocity(body, nodes->x + D * i, D, v);
         } else if (nodes->kind[i] == NODE_CORNER) {
             double wall[3] = {0};
             if (nodes->owner[i] >= 0)
@@ -130,29 +121,17 @@ static void let_go(silt_run *run) {
 static void place_bodies(silt_run *run) {
     if (!run->n_body_before)
         return;
-    const struct silt_body *before = run->body_before;
     const silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
     silt_nodes *nodes = &run->nodes;
+    const int D = silt_nodes_dim(nodes);
     for (int i = 0; i < nodes->count; i++) {
         if (nodes->kind[i] != NODE_BODY)
             continue;
-        const struct silt_body *old = &before[nodes->owner[i]], *now = &bodies->body[nodes->owner[i]];
-        if (now->solid) {
-            double x[3];
-            for (int d = 0; d < 3; d++)
-                x[d] = run->x_old[3 * i + d] - old->x[d];
-            silt_turn(old->q, true, x, x);
-            silt_turn(now->q, false, x, x);
-            for (int d = 0; d < 3; d++)
-                nodes->x[3 * i + d] = now->x[d] + x[d];
-            continue;
-        }
-        // turn from old to new about z: q_now * conj(q_old)
-        const double w = now->q[0] * old->q[0] + now->q[3] * old->q[3], z = now->q[3] * old->q[0] - now->q[0] * old->q[3];
-        const double c = 1 - 2 * z * z, s = 2 * w * z;
-        const double rx = run->x_old[2 * i] - old->x[0], ry = run->x_old[2 * i + 1] - old->x[1];
-        nodes->x[2 * i] = now->x[0] + c * rx - s * ry;
-        nodes->x[2 * i + 1] = now->x[1] + s * rx + c * ry;
+        const struct silt_body *now = &bodies->body[nodes->owner[i]];
+        double place[3];
+        silt_run_body_turn(&run->body_before[nodes->owner[i]], now, run->x_old + D * i, D, place);
+        memcpy(nodes->x + D * i, place, (size_t)D * sizeof(double));
+        silt_run_body_velocity(now, place, D, nodes->v + D * i);
     }
 }
 

@@ -119,6 +119,30 @@ static void water_restore(silt_run *run) {
     silt_stiff_forget(run->fluid.stiff);
 }
 
+static silt_step water_see(silt_run *run) {
+    const silt_scene *scene = run->scene;
+    silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
+                      .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
+                      .seep = silt_seep_on(scene) ? &run->seep : NULL,
+                      .nodes = &run->nodes, .time = run->time, .dt = run->dt};
+    if (silt_run_bodies_free(run)) {
+        step.body_velocity = run->body_velocity;
+        step.body_shift = run->body_shift;
+    }
+    step.gap_force = run->gaps ? run->gap_force : NULL;
+    return step;
+}
+
+static silt_status water_gave_up(const silt_run *run, int tries, bool least, silt_error *err) {
+    char why[sizeof err->text];
+    snprintf(why, sizeof why, "%s", err ? err->text : "");
+    if (err)
+        *err = (silt_error){0};
+    return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s gave up after %d tries, the last with dt = %.3g s%s: %s",
+                     (long long)run->step + 1, run->time, tries, run->dt,
+                     least ? ", which is one of the grains' and cannot be halved (contact.step, contact.youngs_modulus)" : "", why);
+}
+
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
     const silt_scene *scene = run->scene;
     water_keep(run);
@@ -135,31 +159,23 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
             return status;
         }
         run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
-        const silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
-                                .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
-                                .seep = silt_seep_on(scene) ? &run->seep : NULL,
-                                .nodes = &run->nodes, .time = run->time, .dt = run->dt};
+        if (scene->n_body)
+            silt_run_bodies_coast(run);
+        const silt_step step = water_see(run);
         silt_clock_to(CLOCK_assemble);
         status = silt_fluid_step(&run->fluid, &step, err);
         silt_clock_to(CLOCK_rest);
-        if (status == SILT_OK)
-            status = silt_run_loads_sane(run, err);
+        if (status == SILT_OK && scene->n_body)
+            SILT_CLOCKED(coupling, status = silt_run_bodies_load(run, &step, err));
         if (status == SILT_OK) {
-            if (silt_seep_on(scene))
+            if (silt_seep_on(scene) && !silt_run_bodies_free(run))
                 silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
             return SILT_OK;
         }
         water_restore(run);
         const bool least = run->coupling && *n <= 1;
-        if (attempt >= scene->time.retries || least) {
-            char why[sizeof err->text];
-            snprintf(why, sizeof why, "%s", err ? err->text : "");
-            if (err)
-                *err = (silt_error){0};
-            return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s gave up after %d tries, the last with dt = %.3g s%s: %s",
-                             (long long)run->step + 1, run->time, attempt + 1, run->dt,
-                             least ? ", which is one of the grains' and cannot be halved (contact.step, contact.youngs_modulus)" : "", why);
-        }
+        if (attempt >= scene->time.retries || least)
+            return water_gave_up(run, attempt + 1, least, err);
         if (err)
             *err = (silt_error){0};
         run->summary.retries++;
@@ -289,13 +305,22 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         SILT_CLOCKED(coupling, {
             if (attempt == 0)
                 silt_run_place(run);
-            status = silt_run_grains(run, (int)n, before, attempt > 0, err);
+            status = silt_run_grains(run, (int)n, attempt > 0, err);
         });
+        const bool moved = status == SILT_OK;
+        if (moved && scene->fluid.on && silt_run_bodies_free(run)) {
+            const silt_step step = water_see(run);
+            silt_clock_to(CLOCK_assemble);
+            status = silt_run_bodies_answer(run, &step, err);
+            silt_clock_to(CLOCK_rest);
+        }
         if (status == SILT_OK)
             break;
         if (!grains_again(run, &n, attempt, err))
-            return silt_run_grains_failed(run, status, err);
+            return moved ? water_gave_up(run, attempt + 1, run->coupling && n <= 1, err) : silt_run_grains_failed(run, status, err);
     }
+    if (scene->fluid.on && silt_run_bodies_free(run) && silt_seep_on(scene))
+        silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
     if (run->coupling && scene->bed.on)
         SILT_CLOCKED(bed, status = silt_run_deposit(run, err));
     SILT_TRY(status);
@@ -414,7 +439,12 @@ void silt_run_free(silt_run *run) {
     free(run->grown);
     free(run->grown_area);
     free(run->body_before);
-    free(run->body_load);
+    free(run->body_after);
+    free(run->body_velocity);
+    free(run->body_shift);
+    free(run->body_carry);
+    silt_uplift_free(&run->uplift);
+    free(run->gap_force);
     free(run->x_old);
     free(run->p_old);
     free(run->p_shown);

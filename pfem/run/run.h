@@ -21,6 +21,8 @@ typedef struct silt_rest {
     double time; // s
 } silt_rest;
 
+typedef struct silt_uplift silt_uplift; // uplift.c
+
 struct silt_run {
     const silt_scene *scene;
     silt_scene *scene_own; // owned, the same where a run was taken up again, else NULL
@@ -85,8 +87,14 @@ struct silt_run {
 
     int n_body_before, body_before_capacity;
     struct silt_body *body_before; // owned, poses at the start of the step
-    int body_load_capacity;
-    double (*body_load)[6];        // owned, N and N m per m, force and torque of the step before
+    int body_after_capacity, body_velocity_capacity, body_shift_capacity, body_carry_capacity;
+    struct silt_body *body_after;  // owned, poses at its end, as far as they are known
+    double *body_velocity, *body_shift, *gap_force; // owned, dim per node, see silt_step
+    int gap_force_capacity;
+    bool gaps;                     // there are any
+    double (*body_carry)[6];       // owned, N s and N m s per m: what the water gave bodies and they have not received yet
+    silt_uplift *uplift;           // owned
+    double body_error;             // what weight, contacts and water leave open of bodies' momentum, relative to them
     double *x_old;   // owned, 2 per node, positions at the start of the step
     double *v_old, *debt_old; // owned, 2 and 1 per node, velocities and debts at the start of the step
     int *wall_before;  // owned, first wall of every node before contact
@@ -121,12 +129,35 @@ void silt_run_free(silt_run *run);
 // grains.c --------------------------------------------------------------------------------------------
 /** true where the discrete elements are set up anew: checkpoints are taken at such places only */
 bool silt_run_set_up_due(const silt_run *run);
-/** SILT_FAILED: the water's force on a body cannot be. */
-silt_status silt_run_loads_sane(const silt_run *run, silt_error *err);
-/** Grains and bodies over n of their steps, under the water's forces. before: last step, s; again: the step was cut. */
-silt_status silt_run_grains(silt_run *run, int n, double before, bool again, silt_error *err);
+/** Grains and bodies over n of their steps, under the water's forces. again: the step was cut. */
+silt_status silt_run_grains(silt_run *run, int n, bool again, silt_error *err);
 /** what the discrete elements say of their failure, with the step and the bodies. @return status */
 silt_status silt_run_grains_failed(const silt_run *run, silt_status status, silt_error *err);
+
+// bodies.c --------------------------------------------------------------------------------------------
+/** how many of the bodies can move */
+int silt_run_bodies_free(const silt_run *run);
+/** Where x goes that is fixed in a body (dim numbers; a third one 0) */
+void silt_run_body_turn(const struct silt_body *before, const struct silt_body *now, const double *x, int dim, double out[3]);
+/** velocity of what is fixed in a body at x, dim numbers */
+void silt_run_body_velocity(const struct silt_body *body, const double *x, int dim, double *v);
+/** Before the water's step: bodies go on as they do; sets the motion of their nodes. */
+void silt_run_bodies_coast(silt_run *run);
+/** After it, before the discrete elements move: the water's force on bodies and its inertia around them, for the substeps to come.
+ * SILT_FAILED: the force cannot be. */
+silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_error *err);
+/** After the discrete elements have moved: the water's step again, with that motion of the bodies; what its force on them differs
+ * from what they received is carried to the next step. */
+silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_error *err);
+
+// uplift.c --------------------------------------------------------------------------------------------
+/** Where bodies have nothing of the water's mesh on them, but no air either; of the present mesh. Makes *uplift at first. */
+void silt_uplift_find(silt_uplift **uplift, silt_run *run);
+/** out, 6 numbers a body: += factor times force and torque of the pressure there, from p of the nodes around */
+void silt_uplift_force(const silt_uplift *uplift, const silt_run *run, const double *p, double factor, double *out);
+/** out, 2 per node: the pressure there on the water's nodes at its mouths. @return false: there are none */
+bool silt_uplift_mouths(const silt_uplift *uplift, const silt_run *run, double *out);
+void silt_uplift_free(silt_uplift **uplift);
 
 // ledger.c --------------------------------------------------------------------------------------------
 /** volume, mass, momentum, energy and sediment of the state, and their errors so far */

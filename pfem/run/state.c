@@ -48,6 +48,10 @@ silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
         status = silt_store_put(store, "sediment/rest", STORE_BYTE, (size_t)run->n_rest * sizeof *run->rest, run->rest, err);
     if (status == SILT_OK)
         status = silt_store_put(store, "sediment/owed", STORE_BYTE, (size_t)run->n_owed * sizeof *run->owed, run->owed, err);
+    if (status == SILT_OK && run->scene->n_body) {
+        SILT_RESERVE(run->body_carry, run->body_carry_capacity, run->scene->n_body);
+        status = silt_store_put(store, "bodies/carry", STORE_DOUBLE, 6 * (size_t)run->scene->n_body, run->body_carry, err);
+    }
     if (status == SILT_OK)
         status = silt_gauges_save(run->gauges, store, err);
     if (status == SILT_OK && run->scene->fluid.air_pressure > 0)
@@ -105,6 +109,10 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
     SILT_TRY(take_list(store, "sediment/rest", sizeof *run->rest, (void **)&run->rest, &run->n_rest, &run->rest_capacity, err));
     SILT_TRY(take_list(store, "sediment/owed", sizeof *run->owed, (void **)&run->owed, &run->n_owed, &run->owed_capacity, err));
 
+    if (scene->n_body) {
+        SILT_RESERVE(run->body_carry, run->body_carry_capacity, scene->n_body);
+        SILT_TRY(silt_store_take(store, "bodies/carry", STORE_DOUBLE, 6 * (size_t)scene->n_body, run->body_carry, err));
+    }
     if (scene->bed.on)
         SILT_TRY(silt_bed_load(&run->bed, &run->walls, store, err));
     if (silt_seep_on(scene))

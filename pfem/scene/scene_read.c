@@ -470,13 +470,13 @@ static void read_default(read_state *state, const silt_key *key, void *base, con
         state->pending[state->n_pending++] = (read_pending){key, at, node, silt_text("%s", path)};
         return;
     }
-    double x[2] = {0, 0};
+    double x[3] = {0, 0, 0};
     if (text[0] == '[') {
-        // pairs and points: two numbers
-        char first[16] = "", second[16] = "";
-        sscanf(text, "[%15[^,], %15[^]]]", first, second);
-        silt_text_number(first, &x[0]);
-        silt_text_number(second, &x[1]);
+        // pairs and points: two or three numbers
+        char number[3][16] = {"", "", ""};
+        sscanf(text, "[%15[^,], %15[^],], %15[^]]]", number[0], number[1], number[2]);
+        for (int d = 0; d < 3; d++)
+            silt_text_number(number[d], &x[d]);
     } else if (silt_text_number(text, &x[0])) {
         x[1] = x[0];
     }
@@ -507,6 +507,8 @@ static void read_default(read_state *state, const silt_key *key, void *base, con
         *(char **)at = silt_text("%s", text);
         break;
     case KEY_PAIR:
+        memcpy(at, x, 2 * sizeof *x);
+        break;
     case KEY_POINT:
         memcpy(at, x, sizeof x);
         break;

@@ -54,16 +54,6 @@ int silt_scene_warn(const silt_scene *scene, FILE *to) {
                                                          : silt_square(scene->grains.diameter) * n * n * n / (180 * silt_square(1 - n));
     warn_when(scene->bed.on && scene->fluid.on && k * scene->fluid.density * g > scene->fluid.viscosity, scene, to, &count,
               "the bed's conductivity is above 1 m/s, where Darcy's law does not hold");
-    // a body drags its added mass along; for a disc that is the displaced water, for a box of equal sides 1.19 of it
-    for (int b = 0; b < scene->n_body && scene->fluid.on; b++) {
-        const silt_body_def *body = &scene->body[b];
-        if (body->motion == MOTION_FREE && body->density < 1.2 * scene->fluid.density) {
-            fprintf(to, "%s: warning: body '%s' has density %g kg/m3, the water %g: below about its added mass the body's motion is "
-                        "unstable with the weak coupling of this version\n",
-                    scene->path, body->name, body->density, scene->fluid.density);
-            count++;
-        }
-    }
     // parcels about as large as the patches that release them find room again; much smaller ones mostly fill pores
     const double parcel = scene->grains.parcel;
     if (scene->bed.on && scene->grains.on && silt_bed_erodes(&scene->bed) && parcel > 0 &&

@@ -1,0 +1,115 @@
+// what the water of a step answers to a change of velocity on what it is held by: rigid modes of bodies
+#include "fluid.h"
+
+#define MODE_PASSES 4     // the second also takes the excess of the mass; more where viscosity is stiff
+#define MODE_ENOUGH 1e-4  // of the first divergence
+#define MODE_DROP   1e-6  // of the residual of a velocity
+#define MODE_PLANE  1e-6  // of a pressure increment
+#define MODE_SPACE  1e-3
+
+// velocity of the free components from the force on the nodes, held components in place
+static silt_status mode_velocity(silt_fluid *f, const silt_step *s, const double *force, double *w, silt_error *err) {
+    const int D = f->dim;
+    if (f->mu_max > 0 && s->scene->fluid.scheme == SCHEME_IMPLICIT) {
+        bool solved;
+        silt_status status;
+        SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, w));
+        SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, force, MODE_DROP, w, &solved, err));
+        return status;
+    }
+    for (int i = 0; i < f->n_node; i++) {
+        double old[3], fresh[3];
+        for (int d = 0; d < D; d++) {
+            old[d] = w[D * i + d];
+            fresh[d] = force[D * i + d] / f->inertia[i];
+        }
+        silt_hold_project(f, i, old);
+        silt_hold_project(f, i, fresh);
+        for (int d = 0; d < D && s->mesh->wet[i]; d++)
+            w[D * i + d] += fresh[d] - old[d];
+    }
+    return SILT_OK;
+}
+
+// divergence that is left; @return its sum of squares over nodes that keep their volume
+static double mode_divergence(silt_fluid *f, const silt_step *s, const double *w, const double *p) {
+    double square = 0;
+    silt_assemble_projection(f, s->mesh, p);
+    silt_assemble_continuity(f, s->mesh, NULL, NULL, w, p);
+    for (int i = 0; i < f->n_node; i++) {
+        f->residual[i] = s->mesh->wet[i] && f->mobile[i] == 1 ? -f->residual[i] : 0;
+        square += silt_square(f->residual[i]);
+    }
+    return square;
+}
+
+static void mode_excess(silt_fluid *f, const silt_step *s, const double *w, double *acceleration, double *excess) {
+    const int n = f->dim * f->n_node;
+    memset(excess, 0, (size_t)n * sizeof(double));
+    if (s->drag)
+        return;
+    for (int k = 0; k < n; k++)
+        acceleration[k] = w[k] / (f->theta * s->dt);
+    silt_assemble_mass_excess(f, s->mesh, s->scene->fluid.density, acceleration, excess);
+}
+
+silt_status silt_fluid_mode(silt_fluid *f, const silt_step *s, const double *motion, double *reaction, double *pressure,
+                            silt_error *err) {
+    const int D = f->dim;
+    const size_t n = (size_t)f->n_node, bytes = (size_t)D * n * sizeof(double);
+    double *own = silt_alloc((2 * (size_t)D + 1) * n + 1, sizeof *own); // sum of the increments, velocity, excess
+    double *p = own, *w = own + n, *excess = own + (1 + (size_t)D) * n, *force = reaction, first = 0;
+    silt_status status = SILT_OK;
+    // what does not hang on the velocity has no part in its change
+    double *potential = f->potential;
+    silt_seep *seep = f->seep;
+    f->potential = NULL;
+    f->seep = NULL;
+    memcpy(w, motion, bytes);
+    for (int i = 0; i < f->n_node; i++)
+        for (int d = 0; d < D && !s->mesh->wet[i]; d++)
+            w[D * i + d] = 0;
+    for (int pass = 0; pass < MODE_PASSES && status == SILT_OK; pass++) {
+        memcpy(force, excess, bytes);
+        silt_assemble_pressure(f, s->mesh, p, force);
+        status = mode_velocity(f, s, force, w, err);
+        if (status != SILT_OK)
+            break;
+        const double left = mode_divergence(f, s, w, p);
+        if (pass == 0)
+            first = left;
+        if (left <= silt_square(MODE_ENOUGH) * first)
+            break;
+        if (D == 2 && silt_stiff_ready(f->stiff, true))
+            SILT_CLOCKED(solve, silt_stiff_correct(f->stiff, f, f->residual, f->increment, w));
+        else {
+            SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, f->residual, D == 2 ? MODE_PLANE : MODE_SPACE, f->increment, err));
+            if (status == SILT_OK)
+                silt_fluid_correct(f, s, f->increment, w);
+        }
+        for (size_t i = 0; i < n && status == SILT_OK; i++)
+            p[i] += f->increment[i];
+        mode_excess(f, s, w, f->star, excess);
+    }
+    memcpy(pressure, p, n * sizeof *pressure);
+    if (status == SILT_OK) {
+        memset(f->scratch, 0, bytes);
+        silt_assemble_viscous(f, s->mesh, w, 1, f->scratch);
+        memcpy(f->star, excess, bytes);
+        silt_assemble_pressure(f, s->mesh, p, f->star);
+        for (int i = 0; i < f->n_node; i++) {
+            double loose[3];
+            for (int d = 0; d < D; d++) {
+                const int k = D * i + d;
+                loose[d] = reaction[k] = s->mesh->wet[i] ? f->inertia[i] * w[k] + f->scratch[k] - f->star[k] : 0;
+            }
+            silt_hold_project(f, i, loose);
+            for (int d = 0; d < D; d++)
+                reaction[D * i + d] -= loose[d];
+        }
+    }
+    f->potential = potential;
+    f->seep = seep;
+    free(own);
+    return status;
+}

@@ -1,0 +1,536 @@
+// Rigid bodies in water. The water's step is solved with every body going on as it does; then it is an impedance for the discrete
+// elements, which move the bodies under contacts with it; then it takes the motion that came of that (docs/method.md, "Bodies").
+#include "run.h"
+
+#define ROW 6 // numbers of a body: force and torque, or velocity and angular velocity
+
+// rigid modes of a dimension
+static const int mode_plane[] = {0, 1, 5}, mode_space[] = {0, 1, 2, 3, 4, 5};
+
+static int modes(const silt_run *run, const int **mode) {
+    const bool space = silt_nodes_dim(&run->nodes) == 3;
+    *mode = space ? mode_space : mode_plane;
+    return space ? 6 : 3;
+}
+
+static void cross(const double a[3], const double b[3], double out[3]) {
+    for (int d = 0; d < 3; d++)
+        out[d] = a[(d + 1) % 3] * b[(d + 2) % 3] - a[(d + 2) % 3] * b[(d + 1) % 3];
+}
+
+// p q, with w first
+static void quaternion_times(const double p[4], const double q[4], double out[4]) {
+    double v[3];
+    cross(p + 1, q + 1, v);
+    out[0] = p[0] * q[0] - silt_dot(3, p + 1, q + 1);
+    for (int d = 0; d < 3; d++)
+        out[d + 1] = p[0] * q[d + 1] + q[0] * p[d + 1] + v[d];
+}
+
+static void quaternion_turn(const double q[4], const double x[3], double out[3]) {
+    double t[3], u[3];
+    cross(q + 1, x, t);
+    cross(q + 1, t, u);
+    for (int d = 0; d < 3; d++)
+        out[d] = x[d] + 2 * (q[0] * t[d] + u[d]);
+}
+
+// the turn that takes a to b
+static void quaternion_between(const double a[4], const double b[4], double out[4]) {
+    const double back[4] = {a[0], -a[1], -a[2], -a[3]};
+    quaternion_times(b, back, out);
+}
+
+void silt_run_body_turn(const struct silt_body *before, const struct silt_body *now, const double *x, int dim, double out[3]) {
+    double arm[3] = {0}, turn[4];
+    for (int d = 0; d < dim; d++)
+        arm[d] = x[d] - before->x[d];
+    quaternion_between(before->q, now->q, turn);
+    quaternion_turn(turn, arm, out);
+    for (int d = 0; d < 3; d++)
+        out[d] += now->x[d];
+}
+
+void silt_run_body_velocity(const struct silt_body *body, const double *x, int dim, double *v) {
+    double arm[3] = {0}, turning[3];
+    for (int d = 0; d < dim; d++)
+        arm[d] = x[d] - body->x[d];
+    cross(body->w, arm, turning);
+    for (int d = 0; d < dim; d++)
+        v[d] = body->v[d] + turning[d];
+}
+
+int silt_run_bodies_free(const silt_run *run) {
+    int n = 0;
+    for (int b = 0; b < run->scene->n_body && run->coupling; b++)
+        n += run->scene->body[b].motion != MOTION_FIXED;
+    return n;
+}
+
+// the body as it is when it goes on for dt as it does
+static struct silt_body coasting(const struct silt_body *body, double dt) {
+    struct silt_body next = *body;
+    const double angle = dt * silt_length(3, body->w);
+    for (int d = 0; d < 3; d++)
+        next.x[d] += dt * body->v[d];
+    if (angle > 0) {
+        double turn[4] = {cos(0.5 * angle)};
+        for (int d = 0; d < 3; d++)
+            turn[d + 1] = sin(0.5 * angle) * dt * body->w[d] / angle;
+        quaternion_times(turn, body->q, next.q);
+    }
+    return next;
+}
+
+/** Velocities of the nodes on a body that goes from one pose and velocity to another: that of the step's momentum, theta of the way from
+ * the first velocity to the second, about the place half way; and what carries the nodes beside it to where they come. */
+static void node_motion(silt_run *run, const struct silt_body *before, const struct silt_body *now, double theta) {
+    const silt_nodes *nodes = &run->nodes;
+    const int D = silt_nodes_dim(nodes);
+    SILT_RESERVE(run->body_velocity, run->body_velocity_capacity, D * (nodes->count + 1));
+    SILT_RESERVE(run->body_shift, run->body_shift_capacity, D * (nodes->count + 1));
+    for (int i = 0; i < nodes->count; i++) {
+        if (nodes->kind[i] != NODE_BODY)
+            continue;
+        const struct silt_body *a = &before[nodes->owner[i]], *b = &now[nodes->owner[i]];
+        double end[3], arm[3] = {0}, spin[3], turning[3];
+        silt_run_body_turn(a, b, nodes->x + D * i, D, end);
+        for (int d = 0; d < D; d++)
+            arm[d] = 0.5 * (nodes->x[D * i + d] - a->x[d] + end[d] - b->x[d]);
+        for (int d = 0; d < 3; d++)
+            spin[d] = a->w[d] + theta * (b->w[d] - a->w[d]);
+        cross(spin, arm, turning);
+        for (int d = 0; d < D; d++) {
+            const double v = a->v[d] + theta * (b->v[d] - a->v[d]) + turning[d];
+            run->body_velocity[D * i + d] = v;
+            run->body_shift[D * i + d] = (end[d] - nodes->x[D * i + d]) / run->dt - v;
+        }
+    }
+}
+
+void silt_run_bodies_coast(silt_run *run) {
+    const silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    SILT_RESERVE(run->body_before, run->body_before_capacity, bodies->count + 1);
+    SILT_RESERVE(run->body_after, run->body_after_capacity, bodies->count + 1);
+    run->n_body_before = bodies->count;
+    for (int b = 0; b < bodies->count; b++) {
+        run->body_before[b] = bodies->body[b];
+        run->body_after[b] = coasting(&bodies->body[b], run->dt);
+    }
+    node_motion(run, run->body_before, run->body_after, 1);
+    silt_uplift_find(&run->uplift, run);
+    SILT_RESERVE(run->gap_force, run->gap_force_capacity, silt_nodes_dim(&run->nodes) * (run->nodes.count + 1));
+    run->gaps = silt_uplift_mouths(run->uplift, run, run->gap_force);
+}
+
+// force and torque of the nodes' `push` on every body, about its place half way through the step; ROW per body. @param sign  of it
+static void sum_bodies(const silt_run *run, const double *push, double sign, double *out) {
+    const silt_nodes *nodes = &run->nodes;
+    const int D = silt_nodes_dim(nodes);
+    memset(out, 0, (size_t)(ROW * run->n_body_before) * sizeof(double));
+    for (int i = 0; i < run->fluid.n_node; i++) {
+        if (nodes->kind[i] != NODE_BODY || !run->mesh.wet[i])
+            continue;
+        const int b = nodes->owner[i];
+        double arm[3] = {0}, force[3] = {0}, torque[3];
+        for (int d = 0; d < D; d++) {
+            arm[d] = run->fluid.x_mid[D * i + d] - 0.5 * (run->body_before[b].x[d] + run->body_after[b].x[d]);
+            force[d] = sign * push[D * i + d];
+        }
+        cross(arm, force, torque);
+        for (int d = 0; d < 3; d++) {
+            out[ROW * b + d] += force[d];
+            out[ROW * b + 3 + d] += torque[d];
+        }
+    }
+}
+
+// velocity of the nodes on body b for a unit of one of its modes; @return false: it is dry
+static bool mode_motion(const silt_run *run, int b, int mode, double *motion) {
+    const silt_nodes *nodes = &run->nodes;
+    const int D = silt_nodes_dim(nodes);
+    bool wet = false;
+    memset(motion, 0, (size_t)(D * nodes->count) * sizeof(double));
+    for (int i = 0; i < run->fluid.n_node; i++) {
+        if (nodes->kind[i] != NODE_BODY || nodes->owner[i] != b || !run->mesh.wet[i])
+            continue;
+        wet = true;
+        double axis[3] = {0}, arm[3] = {0}, v[3];
+        axis[mode % 3] = 1;
+        for (int d = 0; d < D; d++)
+            arm[d] = run->fluid.x_mid[D * i + d] - 0.5 * (run->body_before[b].x[d] + run->body_after[b].x[d]);
+        cross(axis, arm, v);
+        for (int d = 0; d < D; d++)
+            motion[D * i + d] = mode < 3 ? axis[d] : v[d];
+    }
+    return wet;
+}
+
+// ---------------------------------------------------------------- the impedance
+
+/** what the bodies of a step are for the discrete elements: n free ones, ROW rows each */
+typedef struct silt_impedance {
+    int n, size, capacity, n_live;
+    int *body;       // owned, the free ones, in order
+    double *water;   // owned, size * size, kg: the water's force per acceleration, turned round
+    double *mass;    // owned, the same, of the bodies
+    double *answer;  // owned, the same: R of dem-coupling/response.h
+    int *live;       // owned, rows of motion that is free
+} silt_impedance;
+
+static void impedance_clear(silt_impedance *z) {
+    free(z->body);
+    free(z->water);
+    free(z->mass);
+    free(z->answer);
+    free(z->live);
+}
+
+// the tensor of inertia of a body in space's axes
+static void inertia_turned(const struct silt_body *body, double tensor[3][3]) {
+    const double *k = body->inertia;
+    const double own[3][3] = {{k[0], k[3], k[4]}, {k[3], k[1], k[5]}, {k[4], k[5], k[2]}};
+    double axis[3][3];
+    for (int a = 0; a < 3; a++) {
+        const double unit[3] = {a == 0, a == 1, a == 2};
+        quaternion_turn(body->q, unit, axis[a]);
+    }
+    memset(tensor, 0, 9 * sizeof(double));
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 3; b++)
+            for (int d = 0; d < 3; d++)
+                for (int c = 0; c < 3; c++)
+                    tensor[d][c] += own[a][b] * axis[a][d] * axis[b][c];
+}
+
+// whether forces move a body in this mode
+static bool moves(const silt_body_def *def, int mode) {
+    return def->motion == MOTION_FREE && !(def->held >> (mode < 3 ? mode : 3) & 1);
+}
+
+// it waits for its release, which hangs on the force that acts on it as it stands; in the rest of the step in which that comes it moves
+// with its own mass
+static bool waits(const silt_run *run, int b) {
+    const struct silt_body *body = &run->body_before[b];
+    return run->scene->body[b].release.on && silt_length(3, body->v) == 0 && silt_length(3, body->w) == 0;
+}
+
+static silt_impedance impedance_begin(const silt_run *run) {
+    silt_impedance z = {0};
+    const int *mode, n_mode = modes(run, &mode);
+    z.body = silt_alloc((size_t)run->n_body_before + 1, sizeof *z.body);
+    for (int b = 0; b < run->n_body_before; b++)
+        if (run->scene->body[b].motion != MOTION_FIXED)
+            z.body[z.n++] = b;
+    z.size = ROW * z.n;
+    const size_t numbers = (size_t)z.size * (size_t)z.size + 1;
+    z.water = silt_alloc(numbers, sizeof(double));
+    z.mass = silt_alloc(numbers, sizeof(double));
+    z.answer = silt_alloc(numbers, sizeof(double));
+    z.live = silt_alloc((size_t)z.size + 1, sizeof *z.live);
+    for (int k = 0; k < z.n; k++) {
+        const struct silt_body *body = &run->body_before[z.body[k]];
+        double tensor[3][3];
+        inertia_turned(body, tensor);
+        for (int d = 0; d < 3; d++) {
+            z.mass[(ROW * k + d) * z.size + ROW * k + d] = body->mass;
+            for (int c = 0; c < 3; c++)
+                z.mass[(ROW * k + 3 + d) * z.size + ROW * k + 3 + c] = tensor[d][c];
+        }
+        const silt_body_def *def = &run->scene->body[z.body[k]];
+        for (int m = 0; m < n_mode; m++)
+            if (moves(def, mode[m]) && !waits(run, z.body[k]))
+                z.live[z.n_live++] = ROW * k + mode[m];
+    }
+    return z;
+}
+
+// one solve a mode; its forces on all bodies are a column
+static silt_status impedance_solve(silt_run *run, const silt_step *step, silt_impedance *z, silt_error *err) {
+    const int D = silt_nodes_dim(&run->nodes);
+    const size_t n = (size_t)(D * run->nodes.count) + 1;
+    double *motion = silt_alloc(n, sizeof *motion), *reaction = silt_alloc(n, sizeof *reaction);
+    double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force), *p = silt_alloc(n, sizeof *p);
+    const double per_acceleration = run->fluid.theta * run->dt;
+    silt_status status = SILT_OK;
+    for (int l = 0; l < z->n_live && status == SILT_OK; l++) {
+        const int row = z->live[l], k = row / ROW;
+        if (!mode_motion(run, z->body[k], row % ROW, motion))
+            continue;
+        status = silt_fluid_mode(&run->fluid, step, motion, reaction, p, err);
+        sum_bodies(run, reaction, per_acceleration, force);
+        silt_uplift_force(run->uplift, run, p, -per_acceleration, force);
+        for (int o = 0; o < z->n; o++)
+            for (int r = 0; r < ROW; r++)
+                z->water[(ROW * o + r) * z->size + row] = force[ROW * z->body[o] + r];
+    }
+    for (int r = 0; r < z->size; r++)
+        for (int c = 0; c < r; c++) {
+            double *a = &z->water[r * z->size + c], *b = &z->water[c * z->size + r];
+            *a = *b = 0.5 * (*a + *b);
+        }
+    free(motion);
+    free(reaction);
+    free(force);
+    free(p);
+    return status;
+}
+
+// Cholesky's factor of a symmetric matrix in its lower triangle; @return false: it is not positive definite
+static bool cholesky(int n, double *a) {
+    for (int j = 0; j < n; j++) {
+        for (int k = 0; k < j; k++)
+            for (int i = j; i < n; i++)
+                a[i * n + j] -= a[i * n + k] * a[j * n + k];
+        if (!(a[j * n + j] > 0))
+            return false;
+        const double root = sqrt(a[j * n + j]);
+        for (int i = j; i < n; i++)
+            a[i * n + j] /= root;
+    }
+    return true;
+}
+
+static void cholesky_solve(int n, const double *a, double *x) {
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < i; k++)
+            x[i] -= a[i * n + k] * x[k];
+        x[i] /= a[i * n + i];
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int k = i + 1; k < n; k++)
+            x[i] -= a[k * n + i] * x[k];
+        x[i] /= a[i * n + i];
+    }
+}
+
+// acceleration of the free motions under `force` (size numbers); factor of mass + water over the live rows
+static void impedance_move(const silt_impedance *z, const double *factor, const double *force, double *live, double *acceleration) {
+    for (int l = 0; l < z->n_live; l++)
+        live[l] = force[z->live[l]];
+    cholesky_solve(z->n_live, factor, live);
+    memset(acceleration, 0, (size_t)z->size * sizeof(double));
+    for (int l = 0; l < z->n_live; l++)
+        acceleration[z->live[l]] = live[l];
+}
+
+static void times(int n, const double *a, const double *x, double *out) {
+    for (int r = 0; r < n; r++) {
+        out[r] = 0;
+        for (int c = 0; c < n; c++)
+            out[r] += a[r * n + c] * x[c];
+    }
+}
+
+// weight, and what keeps a turning body's angular momentum
+static void impedance_weight(const silt_run *run, const silt_impedance *z, double *weight, double *gyration) {
+    memset(gyration, 0, (size_t)z->size * sizeof(double));
+    for (int k = 0; k < z->n; k++) {
+        const struct silt_body *body = &run->body_before[z->body[k]];
+        double tensor[3][3], moment[3];
+        inertia_turned(body, tensor);
+        for (int d = 0; d < 3; d++) {
+            moment[d] = silt_dot(3, tensor[d], body->w);
+            weight[ROW * k + d] = body->mass * run->scene->gravity[d];
+            weight[ROW * k + 3 + d] = 0;
+        }
+        cross(body->w, moment, gyration + ROW * k + 3);
+    }
+}
+
+// a free body that would be carried over a cell from rest in the step, or turned as far: the water's step has failed. LIGGGHTS
+// would lose the body without a word.
+static silt_status impedance_sane(const silt_run *run, const silt_impedance *z, const double *force, const double *acceleration,
+                                  silt_error *err) {
+    const silt_scene *scene = run->scene;
+    const int D = silt_nodes_dim(&run->nodes);
+    for (int k = 0; k < z->n; k++) {
+        const struct silt_body *body = &run->body_before[z->body[k]];
+        const double *a = acceleration + ROW * k, *f = force + ROW * k;
+        double reach = 0;
+        for (int p = 0; p < body->n_point; p++)
+            reach = silt_max(reach, silt_length(D, body->point + D * p));
+        const double way = silt_square(run->dt) * (silt_length(3, a) + silt_length(3, a + 3) * reach);
+        if (!(way < scene->fluid.size))
+            return silt_fail(err, SILT_FAILED, "the water's force (%.3g, %.3g, %.3g) N and torque (%.3g, %.3g, %.3g) N m would throw body '%s' at (%g, %g) over %.2g cells in a step",
+                             f[0], f[1], f[2], f[3], f[4], f[5], scene->body[z->body[k]].name, body->x[0], body->x[1], way / scene->fluid.size);
+    }
+    return SILT_OK;
+}
+
+// B and R of the step from the force on bodies that go on as they do
+static silt_status impedance_tell(silt_run *run, silt_impedance *z, const double *force, silt_error *err) {
+    silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    const int n = z->size, m = z->n_live;
+    double *factor = silt_alloc((size_t)m * (size_t)m + 1, sizeof *factor), *work = silt_alloc(6 * (size_t)n + 1, sizeof *work);
+    double *load = work, *weight = work + n, *gyration = work + 2 * n, *a = work + 3 * n, *live = work + 4 * n, *out = work + 5 * n;
+    silt_status status = SILT_OK;
+    for (int r = 0; r < m; r++)
+        for (int c = 0; c < m; c++)
+            factor[r * m + c] = z->mass[z->live[r] * n + z->live[c]] + z->water[z->live[r] * n + z->live[c]];
+    if (!cholesky(m, factor)) {
+        status = silt_fail(err, SILT_FAILED, "the water's inertia at the bodies is not positive");
+        goto done;
+    }
+    impedance_weight(run, z, weight, gyration);
+    for (int r = 0; r < n; r++)
+        load[r] = force[ROW * z->body[r / ROW] + r % ROW] + run->body_carry[z->body[r / ROW]][r % ROW] / run->dt + weight[r] - gyration[r];
+    impedance_move(z, factor, load, live, a);
+    status = impedance_sane(run, z, load, a, err);
+    if (status != SILT_OK)
+        goto done;
+    times(n, z->mass, a, out);
+    for (int k = 0; k < z->n; k++)
+        for (int d = 0; d < 3; d++) { // what is not live is held or led
+            bodies->body[z->body[k]].force[d] = out[ROW * k + d] - weight[ROW * k + d];
+            bodies->body[z->body[k]].torque[d] = out[ROW * k + 3 + d] + gyration[ROW * k + 3 + d];
+        }
+    for (int k = 0; k < z->n; k++)
+        for (int d = 0; d < 3 && waits(run, z->body[k]); d++) {
+            bodies->body[z->body[k]].force[d] = force[ROW * z->body[k] + d];
+            bodies->body[z->body[k]].torque[d] = force[ROW * z->body[k] + 3 + d];
+        }
+    for (int c = 0; c < n; c++) {
+        memset(load, 0, (size_t)n * sizeof *load);
+        load[c] = 1;
+        impedance_move(z, factor, load, live, a);
+        times(n, z->mass, a, out);
+        for (int r = 0; r < n; r++)
+            z->answer[r * n + c] = out[r] - (r == c);
+    }
+    // what does not move under forces has no answer
+    uint8_t *free_row = silt_alloc((size_t)n + 1, 1);
+    for (int l = 0; l < m; l++)
+        free_row[z->live[l]] = 1;
+    for (int r = 0; r < n; r++)
+        for (int c = 0; c < n; c++)
+            if (!free_row[r] || !free_row[c])
+                z->answer[r * n + c] = 0;
+    free(free_row);
+done:
+    free(factor);
+    free(work);
+    return status;
+}
+
+silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_error *err) {
+    SILT_RESERVE(run->body_carry, run->body_carry_capacity, run->n_body_before + 1);
+    double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force);
+    sum_bodies(run, run->fluid.reaction, -1, force);
+    silt_uplift_force(run->uplift, run, run->nodes.p, 1, force);
+    if (!silt_run_bodies_free(run)) {
+        silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+        for (int b = 0; b < bodies->count; b++) {
+            memcpy(bodies->body[b].force, force + ROW * b, sizeof bodies->body[b].force);
+            memcpy(bodies->body[b].torque, force + ROW * b + 3, sizeof bodies->body[b].torque);
+        }
+        free(force);
+        return SILT_OK;
+    }
+    silt_impedance z = impedance_begin(run);
+    silt_status status = impedance_solve(run, step, &z, err);
+    if (status == SILT_OK)
+        status = impedance_tell(run, &z, force, err);
+    if (status == SILT_OK && z.n)
+        silt_coupling_dem.respond(run->coupling, z.size, z.answer);
+    impedance_clear(&z);
+    free(force);
+    return status;
+}
+
+// ---------------------------------------------------------------- the answer
+
+/** What grains have received is what the water gives them, whatever comes of its step: forces of the first solve. */
+typedef struct held_drag {
+    silt_drag drag;
+    const silt_fluid *fluid;
+    const silt_mesh *mesh;
+    const silt_drag *first;        // borrowed
+    double *push, *given, *w, *lost; // owned; given, w and lost: push, velocity and the pressure's force on grains at the nodes then
+} held_drag;
+
+// what of the pressure's force on the nodes acts on grains
+static void pressure_on_grains(const silt_fluid *fluid, const silt_mesh *mesh, const double *p, double *out) {
+    silt_fluid clear = *fluid;
+    clear.share = NULL;
+    const int n = fluid->dim * fluid->n_node;
+    memset(out, 0, (size_t)n * sizeof *out);
+    silt_assemble_pressure(&clear, mesh, p, out);
+    for (int k = 0; k < n; k++)
+        out[k] = -out[k];
+    silt_assemble_pressure(fluid, mesh, p, out);
+}
+
+static void held_update(void *self, const double *velocity, const double *pressure, double dt) {
+    held_drag *h = self;
+    (void)dt;
+    const int D = h->fluid->dim, n = D * h->fluid->n_node;
+    pressure_on_grains(h->fluid, h->mesh, pressure, h->push);
+    for (int k = 0; k < n; k++)
+        h->push[k] = h->given[k] - h->first->coefficient[k / D] * (h->w[k] - velocity[k]) + h->lost[k] - h->push[k];
+}
+
+static void held_begin(held_drag *h, const silt_run *run, const silt_drag *drag) {
+    const size_t n = (size_t)run->fluid.n_node, numbers = n * (size_t)run->fluid.dim;
+    *h = (held_drag){.drag = *drag, .fluid = &run->fluid, .mesh = &run->mesh, .first = drag};
+    h->push = silt_alloc(numbers + 1, sizeof(double));
+    h->given = silt_alloc(numbers + 1, sizeof(double));
+    h->w = silt_alloc(numbers + 1, sizeof(double));
+    h->lost = silt_alloc(numbers + 1, sizeof(double));
+    memcpy(h->given, drag->push, numbers * sizeof(double));
+    memcpy(h->w, run->fluid.w, numbers * sizeof(double));
+    pressure_on_grains(&run->fluid, &run->mesh, run->fluid.pressure_new, h->lost);
+    h->drag.push = h->push;
+    h->drag.update = held_update;
+    h->drag.self = h;
+}
+
+static void held_end(held_drag *h) {
+    free(h->push);
+    free(h->given);
+    free(h->w);
+    free(h->lost);
+}
+
+silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_error *err) {
+    silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    memcpy(run->body_after, bodies->body, (size_t)run->n_body_before * sizeof *bodies->body);
+    node_motion(run, run->body_before, run->body_after, run->fluid.theta);
+    silt_step again = *step;
+    again.body_velocity = run->body_velocity;
+    again.body_shift = run->body_shift;
+    held_drag held = {0};
+    if (step->drag) {
+        held_begin(&held, run, step->drag);
+        again.drag = &held.drag;
+    }
+    const silt_status status = silt_fluid_again(&run->fluid, &again, err);
+    held_end(&held);
+    SILT_TRY(status);
+    double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force);
+    sum_bodies(run, run->fluid.reaction, -1, force);
+    silt_uplift_force(run->uplift, run, run->nodes.p, 1, force);
+    run->body_error = 0;
+    for (int b = 0; b < run->n_body_before; b++) {
+        struct silt_body *body = &bodies->body[b];
+        const silt_body_def *def = &run->scene->body[b];
+        const struct silt_body *old = &run->body_before[b];
+        const bool still = waits(run, b);
+        double off[3] = {0}, size = 0;
+        for (int d = 0; d < 3 && !still; d++) {
+            // what moved it came of weight, contacts and water
+            const double moved = body->mass * (body->v[d] - old->v[d]) / run->dt, weight = body->mass * run->scene->gravity[d];
+            off[d] = moves(def, d) ? moved - weight - body->contact[d] - body->force[d] : 0;
+            size += fabs(moved) + fabs(weight) + fabs(body->contact[d]) + fabs(body->force[d]);
+        }
+        if (size > 0)
+            run->body_error = silt_max(run->body_error, silt_length(3, off) / size);
+        for (int d = 0; d < 6; d++) {
+            double *told = d < 3 ? &body->force[d] : &body->torque[d - 3], *carry = &run->body_carry[b][d];
+            *carry = !still && moves(def, d) ? *carry + run->dt * (force[ROW * b + d] - *told) : 0;
+            *told = force[ROW * b + d];
+        }
+    }
+    free(force);
+    return SILT_OK;
+}
