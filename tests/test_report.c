@@ -353,7 +353,7 @@ static void test_view(void **state) {
     if (silt_report(folder, &small, NULL, &err))
         fail_msg("%s", err.text);
     page = page_read();
-    contains(page, "2 of 3 frames, evenly spread: more would not fit.");
+    contains(page, "2 of 3 frames, evenly spread: the others are left out to keep the page small.");
     contains(page, "{\"t\":1,\"frame\":2");
     assert_null(strstr(page, "{\"t\":0.5,"));
     free(page);

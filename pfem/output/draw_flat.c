@@ -51,11 +51,19 @@ void silt_draw_flat_survey(silt_draw_canvas *c, const silt_frame_entry *entry, i
     for (int s = 0; s < samples; s++) {
         int number = entry[samples > 1 ? (int)((long)s * (n_frame - 1) / (samples - 1)) : 0].number;
         static const char *const part[] = {"fluid", "bed", "grains", "bodies"};
-        for (int k = 0; k < (c->slice ? 3 : 4); k++) {
+        for (int k = 0; k < 4; k++) {
             silt_grid grid;
             const char *array = k == 0 ? c->field->water : k == 1 ? c->field->bed : k == 2 ? silt_draw_grain_array(c) : NULL;
             if (!silt_draw_read(c, &grid, part[k], number, array))
                 continue;
+            if (k == 3 && c->slice) {
+                double(*cut)[4];
+                for (int i = silt_draw_slice_faces(c, &grid, &cut); i-- > 0;)
+                    draw_extend(lo, hi, cut[i][0], cut[i][1]);
+                free(cut);
+                silt_grid_clear(&grid);
+                continue;
+            }
             bool *counts = silt_alloc((size_t)grid.n_point + 1, sizeof *counts);
             // water: nodes of triangles only, spray does not count
             for (int i = 0; i < grid.n_cell; i++) {

@@ -457,8 +457,38 @@ static void space_frame(space *s) {
     s->hi[1] += 0.03 * high;
 }
 
+// the box of the walls; false: there are none
+static bool space_walls_box(const silt_draw_canvas *c, double lo[3], double hi[3]) {
+    const silt_walls *walls = c->walls;
+    for (int d = 0; d < 3; d++)
+        lo[d] = HUGE_VAL, hi[d] = -HUGE_VAL;
+    for (int i = 0; walls && walls->corner && i < walls->count; i++)
+        for (int k = 0; k < 9; k++) {
+            lo[k % 3] = silt_min(lo[k % 3], walls->corner[i][k / 3][k % 3]);
+            hi[k % 3] = silt_max(hi[k % 3], walls->corner[i][k / 3][k % 3]);
+        }
+    return lo[0] <= hi[0];
+}
+
+// a frame's part widens the room; grains and bodies that have left the walls' box do not
+static void space_widen(silt_draw_canvas *c, const silt_grid *grid, const double *within_lo, const double *within_hi, double lo[3], double hi[3]) {
+    bool *counts = silt_alloc((size_t)grid->n_point + 1, sizeof *counts);
+    for (int i = 0; i < grid->n_point; i++) {
+        counts[i] = true;
+        for (int d = 0; d < 3 && within_lo; d++)
+            counts[i] &= grid->x[3 * i + d] >= within_lo[d] && grid->x[3 * i + d] <= within_hi[d];
+        for (int d = 0; d < 3 && counts[i]; d++) {
+            lo[d] = silt_min(lo[d], grid->x[3 * i + d]);
+            hi[d] = silt_max(hi[d], grid->x[3 * i + d]);
+        }
+    }
+    silt_draw_range(c, grid, counts);
+    free(counts);
+}
+
 void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, int n_frame) {
-    double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, wall_lo[3], wall_hi[3];
+    const bool walled = space_walls_box(c, wall_lo, wall_hi);
     c->low = HUGE_VAL, c->high = -HUGE_VAL;
     int samples = n_frame < DRAW_SAMPLES ? n_frame : DRAW_SAMPLES;
     for (int k = 0; k < samples; k++) {
@@ -469,26 +499,16 @@ void silt_draw_space_survey(silt_draw_canvas *c, const silt_frame_entry *entry, 
             silt_grid grid;
             if (!silt_draw_read(c, &grid, name[part], number, array[part]))
                 continue;
-            bool *counts = silt_alloc((size_t)grid.n_point + 1, sizeof *counts);
-            for (int i = 0; i < grid.n_point; i++) {
-                counts[i] = true;
-                for (int d = 0; d < 3; d++) {
-                    lo[d] = silt_min(lo[d], grid.x[3 * i + d]);
-                    hi[d] = silt_max(hi[d], grid.x[3 * i + d]);
-                }
-            }
-            silt_draw_range(c, &grid, counts);
-            free(counts);
+            space_widen(c, &grid, walled && part >= 2 ? wall_lo : NULL, wall_hi, lo, hi);
             silt_grid_clear(&grid);
         }
     }
     // walls bound the room; upwards the water does, high empty tanks are cut
     const double room = lo[2] <= hi[2] ? hi[2] + 0.15 * (hi[2] - lo[2]) : HUGE_VAL;
-    for (int i = 0; c->walls && c->walls->corner && i < c->walls->count; i++)
-        for (int k = 0; k < 9; k++) {
-            lo[k % 3] = silt_min(lo[k % 3], c->walls->corner[i][k / 3][k % 3]);
-            hi[k % 3] = silt_max(hi[k % 3], c->walls->corner[i][k / 3][k % 3]);
-        }
+    for (int d = 0; d < 3 && walled; d++) {
+        lo[d] = silt_min(lo[d], wall_lo[d]);
+        hi[d] = silt_max(hi[d], wall_hi[d]);
+    }
     hi[2] = silt_min(hi[2], room);
     for (int d = 0; d < 3; d++) {
         c->lo[d] = lo[d] <= hi[d] ? lo[d] : 0;

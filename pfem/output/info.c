@@ -95,6 +95,7 @@ void silt_info_scene(const silt_scene *scene, FILE *to) {
         fprintf(to, "  body       %s, %g kg/m3, %g m wide at (%g, %g)\n", scene->body[i].name, scene->body[i].density,
                 scene->body[i].scale, scene->body[i].at[0], scene->body[i].at[1]);
     fprintf(to, "  walls      %d, gauges %d, checks %d\n", scene->n_wall, scene->n_gauge, scene->n_check);
+    silt_info_parts(scene, to);
 }
 
 // ---------------------------------------------------------------- an output folder

@@ -186,6 +186,14 @@ silt_status silt_pictures_load(const silt_pictures **pictures, silt_error *err);
 silt_status silt_info(const char *path, FILE *to, silt_error *err);
 /** the part of it about a scene */
 void silt_info_scene(const silt_scene *scene, FILE *to);
+/** info_parts.c: what the scene uses and what that costs, and what it goes without */
+void silt_info_parts(const silt_scene *scene, FILE *to);
+/** bytes that are kept from step to step: of a node of the water, of the bed, of the bed with water in its pores on top, of a node of the
+ * water where grains or bodies are, of a grain. As measured: tests/test_parts.c holds them. */
+typedef struct silt_costs {
+    double water, bed, seepage, coupling, grain;
+} silt_costs;
+extern const silt_costs silt_costs_measured[2]; // in the plane, in space
 /** warn.c: prints what is allowed but probably not meant, a line each; @return how many */
 int silt_scene_warn(const silt_scene *scene, FILE *to);
 

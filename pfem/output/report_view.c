@@ -5,7 +5,7 @@
 #include <unistd.h>
 
 // frames of the view at the most, those that are looked at for its size, grains of a frame at the most, numbers of a place
-enum { VIEW_FRAMES = 200, VIEW_SAMPLES = 5, VIEW_GRAINS = 40000, VIEW_STEPS = 65535 };
+enum { VIEW_FRAMES = 400, VIEW_SAMPLES = 5, VIEW_GRAINS = 40000, VIEW_STEPS = 65535 };
 
 static const char *const view_library[] = {"/usr/share/javascript/three/three.min.js",
                                            "/usr/share/javascript/three/examples/js/controls/OrbitControls.js"};
@@ -380,7 +380,7 @@ const char *silt_report_view(const silt_report_page *report, silt_draw_canvas *c
     fprintf(to, canvas->scene->dimension == 3 ? "Drag to turn, with the right button to move, wheel to zoom. "
                                               : "Drag to move, wheel to zoom. ");
     if (n < book->n_frame)
-        fprintf(to, "%d of %d frames, evenly spread: more would not fit.", n, book->n_frame);
+        fprintf(to, "%d of %d frames, evenly spread: the others are left out to keep the page small.", n, book->n_frame);
     else
         fprintf(to, "All %d frames.", n);
     if (v.left_out)

@@ -316,7 +316,10 @@
     if (space && data.frames.some(function (frame) { return frame.water; }))
         tickBox('see through the water', false, function (on) { glass = on; });
     element('button', parts, 'whole view').addEventListener('click', fit);
-    if (data.label) {
+    var coloured = data.frames.some(function (frame) {
+        return ['water', 'bed'].some(function (name) { return frame[name] && frame[name].c !== undefined; });
+    });
+    if (data.label && coloured) {
         var scale = element('span', parts);
         scale.className = 'scale';
         element('span', scale, data.low.toPrecision(3));
@@ -334,5 +337,9 @@
     window.addEventListener('resize', resize);
     resize();
     fit();
-    show(data.frames.length - 1);
+    // the last frame, or the one at the time that the address tells: report.html#t=2.5
+    var asked = /^#t=([-+.\de]+)$/.exec(window.location.hash), first = data.frames.length - 1;
+    while (asked && first > 0 && Math.abs(data.frames[first - 1].t - asked[1]) < Math.abs(data.frames[first].t - asked[1]))
+        first--;
+    show(first);
 }());

@@ -317,7 +317,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         if (status == SILT_OK)
             break;
         if (!grains_again(run, &n, attempt, err))
-            return moved ? water_gave_up(run, attempt + 1, run->coupling && n <= 1, err) : silt_run_grains_failed(run, status, err);
+            return moved ? water_gave_up(run, attempt + 1, n <= 1, err) : silt_run_grains_failed(run, status, err);
     }
     if (scene->fluid.on && silt_run_bodies_free(run) && silt_seep_on(scene))
         silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
@@ -457,4 +457,5 @@ void silt_run_free(silt_run *run) {
     free(run->out);
     free(run->worker);
     free(run->log);
+    free(run->trace);
 }

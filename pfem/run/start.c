@@ -34,7 +34,8 @@ void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def) {
                                .walls = &run->walls,
                                .bed = run->scene->bed.on ? &run->bed : NULL,
                                .worker = run->worker,
-                               .log = run->log};
+                               .log = run->log,
+                               .trace = run->trace};
     memcpy(def->lo, run->box_lo, sizeof def->lo);
     memcpy(def->hi, run->box_hi, sizeof def->hi);
     memcpy(def->way_lo, run->way_lo, sizeof def->way_lo);
