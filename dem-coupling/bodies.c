@@ -138,7 +138,9 @@ silt_status silt_coupling_bodies(silt_coupling *c, silt_error *err) {
             state->x[k] = place[k];
             state->v[k] = c->body[i].fixed ? 0.0 : def->velocity[k];
         }
-        SILT_TRY(c->dim == 3 ? body_space(scene, &c->body[i], state, def, place[3], err) : body_plane(&c->body[i], state, def, place[3], err));
+        SILT_TRY(c->dim == 3 ? body_space(scene, &c->body[i], state, def, def->angle * M_PI / 180.0, err)
+                             : body_plane(&c->body[i], state, def, place[3], err));
+        memcpy(c->body[i].first, state->q, sizeof state->q);
     }
     for (int i = 0; i < scene->n_body; i++) {
         c->bodies->body[i].n_sphere = c->body[i].clump.n_sphere;

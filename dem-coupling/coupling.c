@@ -532,7 +532,7 @@ static silt_status coupling_complete(const silt_coupling *c, const silt_dem_stat
 static silt_status coupling_finish(silt_coupling *c, silt_error *err) {
     SILT_TRY(silt_dem_wait(c->dem, err));
     const silt_dem_state *state = silt_dem_state_now(c->dem);
-    silt_coupling_guided(c);
+    SILT_TRY(silt_coupling_guided(c, err));
     SILT_TRY(coupling_complete(c, state, err));
     memset(c->contact, 0, sizeof c->contact);
     if (c->elapsed > 0.0)
@@ -574,7 +574,7 @@ static silt_status coupling_create(silt_coupling **coupling, const silt_coupling
     c->view = silt_alloc(1, sizeof *c->view);
     SILT_TRY(silt_coupling_bodies(c, err));
     coupling_measure(c, def);
-    return SILT_OK;
+    return silt_trace_open(c, def->trace, def->resumed, def->walls->time, err);
 }
 
 static silt_status coupling_open_dem(silt_coupling *c, silt_error *err) {
@@ -644,6 +644,8 @@ static void coupling_close(silt_coupling **coupling) {
     free(c->wall);
     free(c->triangle);
     free(c->guide);
+    if (c->trace != NULL)
+        fclose(c->trace);
     silt_coupling_bodies_clear(c);
     coupling_view *w = c->view;
     void *owned[] = {w->contact, w->id,       w->x,          w->v,           w->omega, w->radius, w->mass, w->net,

@@ -21,22 +21,30 @@ void silt_coupling_place(const silt_coupling *c, int i, double time, double plac
     silt_path_at(&def->path, time, place);
     for (int d = 0; d < 3; d++)
         place[d] += def->at[d];
-    place[3] += def->angle * M_PI / 180;
+    place[3] += c->dim == 3 ? 0 : def->angle * M_PI / 180;
+}
+
+// how far the path has turned a body: in space from x to z, besides what `angle` says
+static double guide_turned(const silt_coupling *c, int i) {
+    const struct silt_body *b = &c->bodies->body[i];
+    double x[3] = {1, 0, 0};
+    if (c->dim != 3)
+        return 2 * atan2(b->q[3], b->q[0]);
+    silt_turn(c->body[i].first, true, x, x);
+    silt_turn(b->q, false, x, x);
+    return atan2(x[2], x[0]);
 }
 
 static void guide_body(const silt_coupling *c, dem_guide *guide, dem_guided *to, int i, int *n_path) {
     const silt_body_def *def = &c->scene->body[i];
-    const struct silt_body *b = &c->bodies->body[i];
     const int n = guide->n_step;
     *to = (dem_guided){.slot = guide_slot(c, i), .held = def->held, .path = -1, .release = INT32_MAX, .force = HUGE_VAL};
     if (def->motion == MOTION_PRESCRIBED) {
         to->path = (*n_path)++;
-        double(*row)[4] = dem_guide_path(guide, to->path), now[4] = {0, 0, 0, 2 * atan2(b->q[3], b->q[0])};
-        if (c->dim == 3) // where the path had it: an angle cannot be read off a body in space
-            silt_coupling_place(c, i, guide_time(c, n, 0), now);
+        double(*row)[4] = dem_guide_path(guide, to->path);
         for (int k = 0; k <= n; k++) {
             silt_coupling_place(c, i, guide_time(c, n, k + 1), row[k]);
-            row[k][3] -= now[3];
+            row[k][3] -= guide_turned(c, i);
         }
     } else if (def->release.on && !c->body[i].freed) {
         to->held = HELD_ALL;
@@ -49,24 +57,18 @@ static void guide_body(const silt_coupling *c, dem_guide *guide, dem_guided *to,
     }
 }
 
-static void guide_ties(const silt_coupling *c, dem_guide *guide, int i, dem_tie *to) {
+static void guide_ties(const silt_coupling *c, int i, dem_tie *to) {
     const silt_body_def *def = &c->scene->body[i];
-    const struct silt_body *b = &c->bodies->body[i];
-    const double turn = 2 * atan2(b->q[3], b->q[0]) - def->angle * M_PI / 180, cosine = cos(turn), sine = sin(turn);
     for (int k = 0; k < def->n_spring; k++) {
         const silt_spring_def *s = &def->spring[k];
-        const double arm[3] = {s->at[0] - def->at[0], s->at[1] - def->at[1], s->at[2] - def->at[2]};
-        to[k] = (dem_tie){.slot = guide_slot(c, i), .line = s->line, .arm = {cosine * arm[0] - sine * arm[1], sine * arm[0] + cosine * arm[1]},
-                          .stiffness = s->stiffness * c->width, .damping = s->damping * c->width, .length = s->length};
+        to[k] = (dem_tie){.slot = guide_slot(c, i), .line = s->line, .stiffness = s->stiffness * c->width, .damping = s->damping * c->width,
+                          .length = s->length};
+        for (int d = 0; d < 3; d++)
+            to[k].arm[d] = s->at[d] - def->at[d];
+        silt_turn(c->body[i].first, true, to[k].arm, to[k].arm);
+        silt_turn(c->bodies->body[i].q, false, to[k].arm, to[k].arm);
         memcpy(to[k].to, s->to, sizeof to[k].to);
-        if (c->dim == 3) {
-            double start[4];
-            silt_coupling_orientation(def, def->angle * M_PI / 180, start);
-            silt_turn(start, true, arm, to[k].arm);
-            silt_turn(b->q, false, to[k].arm, to[k].arm);
-        }
     }
-    (void)guide;
 }
 
 // a held body that was freed keeps what the scene holds for good
@@ -83,13 +85,13 @@ static void guide_walls(silt_coupling *c, dem_guide *guide) {
 }
 
 void silt_coupling_guide(silt_coupling *c, int n) {
-    dem_guide head = {.n_step = n, .n_wall = c->accelerates ? c->n_motion : 0};
+    dem_guide head = {.n_step = n, .n_wall = c->accelerates ? c->n_motion : 0, .n_trace = silt_trace_count(c)};
     for (int i = 0; i < c->bodies->count; i++) {
         head.n_body += guide_needed(c, i);
         head.n_path += c->scene->body[i].motion == MOTION_PRESCRIBED;
         head.n_tie += c->scene->body[i].n_spring;
     }
-    if (n == 0 || (!head.n_body && !head.n_tie && !head.n_wall))
+    if (n == 0 || (!head.n_body && !head.n_tie && !head.n_wall && !head.n_trace))
         return;
     const size_t size = dem_guide_size(&head);
     SILT_RESERVE(c->guide, c->guide_capacity, (int)size);
@@ -101,10 +103,12 @@ void silt_coupling_guide(silt_coupling *c, int n) {
     for (int i = 0, n_path = 0; i < c->bodies->count; i++) {
         if (guide_needed(c, i))
             guide_body(c, guide, body++, i, &n_path);
-        guide_ties(c, guide, i, tie);
+        guide_ties(c, i, tie);
         tie += c->scene->body[i].n_spring;
     }
     guide_walls(c, guide);
+    if (head.n_trace)
+        silt_trace_ask(c, guide);
     silt_dem_guide(c->dem, c->guide, size);
 }
 
@@ -126,7 +130,7 @@ silt_status silt_coupling_freed(silt_coupling *c, bool out, silt_store *store, s
     return status;
 }
 
-void silt_coupling_guided(silt_coupling *c) {
+silt_status silt_coupling_guided(silt_coupling *c, silt_error *err) {
     const dem_guide *told = silt_dem_guided(c->dem);
     for (int i = 0, k = 0; told && i < c->bodies->count; i++) {
         if (!guide_needed(c, i))
@@ -136,4 +140,5 @@ void silt_coupling_guided(silt_coupling *c) {
         if (release->on && (body->freed || body->release <= told->n_step))
             c->body[i].freed = true;
     }
+    return silt_trace_write(c, told, err);
 }

@@ -27,15 +27,22 @@ typedef struct dem_tie {
     double stiffness, damping, length;
 } dem_tie;
 
+/** a body or grain whose contact force is written down */
+typedef struct dem_traced {
+    int slot, order; // among the free bodies, or among the grains of the last answer; the other is -1
+} dem_traced;
+
 /** The block: this head, n_body guided bodies, n_tie ties, n_path paths of n_step + 1 rows (x, y, z, turn in radians since the start of
- * the run) at the end of every substep and of the one after the run, n_wall walls of n_step rows (velocity, spin). */
+ * the run) at the end of every substep and of the one after the run, n_wall walls of n_step rows (velocity, spin), n_trace that are
+ * traced, and the answer: n_step rows of n_trace forces in N. */
 typedef struct dem_guide {
-    int n_body, n_tie, n_path, n_wall, n_step, pad;
+    int n_body, n_tie, n_path, n_wall, n_trace, n_step;
 } dem_guide;
 
 static inline size_t dem_guide_size(const dem_guide *g) {
     return sizeof *g + (size_t)g->n_body * sizeof(dem_guided) + (size_t)g->n_tie * sizeof(dem_tie) +
-           ((size_t)g->n_path * (size_t)(g->n_step + 1) + (size_t)g->n_wall * (size_t)g->n_step) * 4 * sizeof(double);
+           ((size_t)g->n_path * (size_t)(g->n_step + 1) + (size_t)g->n_wall * (size_t)g->n_step) * 4 * sizeof(double) +
+           (size_t)g->n_trace * (sizeof(dem_traced) + 3 * (size_t)g->n_step * sizeof(double));
 }
 static inline dem_guided *dem_guide_body(dem_guide *g) { return (dem_guided *)(void *)(g + 1); }
 static inline dem_tie *dem_guide_tie(dem_guide *g) { return (dem_tie *)(void *)(dem_guide_body(g) + g->n_body); }
@@ -45,5 +52,7 @@ static inline double (*dem_guide_path(dem_guide *g, int path))[4] {
 static inline double (*dem_guide_wall(dem_guide *g, int wall))[4] {
     return dem_guide_path(g, g->n_path) + (size_t)wall * (size_t)g->n_step;
 }
+static inline dem_traced *dem_guide_traced(dem_guide *g) { return (dem_traced *)(void *)dem_guide_wall(g, g->n_wall); }
+static inline double *dem_guide_trace(dem_guide *g) { return (double *)(void *)(dem_guide_traced(g) + g->n_trace); }
 
 #endif

@@ -27,7 +27,9 @@ static struct {
     void *bodies;        // LIGGGHTS' store of them
     motion_pose *pose;   // owned, one per guided body
     double (*arm)[3];    // owned, one per tie: in the axes of its body
-    int n_pose, n_arm;
+    int n_pose, n_arm, n_contact;
+    double (*contact)[3]; // owned, one per free body where forces are traced
+    const dem_shared *shared;
 } motion;
 
 #define MOTION_EXPORT __attribute__((visibility("default")))
@@ -96,6 +98,7 @@ static void motion_cross(const double *a, const double *b, double *c) {
 void motion_begin(dem_guide *guide, const dem_shared *shared) {
     motion.guide = guide;
     motion.step = shared->step;
+    motion.shared = shared;
     motion.dim = shared->dim;
     motion.substep = motion.running = 0;
     if (!guide || !motion.bodies)
@@ -104,7 +107,9 @@ void motion_begin(dem_guide *guide, const dem_shared *shared) {
         motion.pose = realloc(motion.pose, (size_t)(motion.n_pose = guide->n_body) * sizeof *motion.pose);
     if (guide->n_tie > motion.n_arm)
         motion.arm = realloc(motion.arm, (size_t)(motion.n_arm = guide->n_tie) * sizeof *motion.arm);
-    if ((guide->n_body && !motion.pose) || (guide->n_tie && !motion.arm))
+    if (guide->n_trace && shared->n_body > motion.n_contact)
+        motion.contact = realloc(motion.contact, (size_t)(motion.n_contact = shared->n_body) * sizeof *motion.contact);
+    if ((guide->n_body && !motion.pose) || (guide->n_tie && !motion.arm) || (motion.n_contact && !motion.contact))
         abort();
     for (int k = 0; k < guide->n_body; k++) {
         motion_body b;
@@ -248,6 +253,17 @@ static void motion_ties(dem_guide *guide) {
     }
 }
 
+void motion_contact(int slot, double force[3]) { memcpy(force, motion.contact[slot], sizeof motion.contact[slot]); }
+
+static void motion_note(void) {
+    const dem_body *body = DEM_SECTION(motion.shared, const dem_body, body);
+    motion_body b;
+    for (int k = 0; k < motion.shared->n_body; k++)
+        for (int d = 0; d < 3; d++)
+            motion.contact[k][d] =
+                motion_look(k, &b) ? b.force[d] - body[k].force[d] - body[k].mass * motion.shared->gravity[d] : NAN;
+}
+
 MOTION_EXPORT void motion_forces(void *self, int set_up) __asm__(MOTION_FORCE);
 void motion_forces(void *self, int set_up) {
     static motion_force *original;
@@ -259,6 +275,8 @@ void motion_forces(void *self, int set_up) {
     motion.substep += motion.running;
     if (!guide || !motion.bodies || motion.substep > guide->n_step)
         return;
+    if (guide->n_trace)
+        motion_note();
     motion_ties(guide);
     for (int k = 0; k < guide->n_body; k++)
         if (motion_look(dem_guide_body(guide)[k].slot, &b))

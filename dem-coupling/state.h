@@ -59,6 +59,7 @@ typedef struct coupling_body {
     silt_clump clump;
     bool fixed;
     bool freed; // its release has come
+    double first[4]; // orientation at the start
     double old_v[3];
 } coupling_body;
 
@@ -80,6 +81,7 @@ struct silt_coupling {
     bool accelerates;        // one of them does so within a step: its rate is told substep by substep
     unsigned char *guide;    // owned, what the worker is told besides forces (guide.h)
     int guide_capacity;
+    FILE *trace;             // owned, NULL: none is asked for
     double width;            // m, accounting width: spheres stand for what is in this width of the slab; 1 in space
     double step;             // s, of the discrete elements
     double parcel;           // m, usual radius of a parcel, 0 without bed
@@ -188,10 +190,17 @@ void silt_coupling_wall_rates(silt_coupling *coupling, int m, int n, double (*ra
 // guide.c
 /** Tells the worker what guides bodies and walls in the next n substeps; nothing where nothing does. After silt_coupling_walls_go. */
 void silt_coupling_guide(silt_coupling *coupling, int n);
-/** after the run: who was set free */
-void silt_coupling_guided(silt_coupling *coupling);
+/** after the run: who was set free, what was traced */
+silt_status silt_coupling_guided(silt_coupling *coupling, silt_error *err);
 /** to and from a checkpoint: who was */
 silt_status silt_coupling_freed(silt_coupling *coupling, bool out, silt_store *store, silt_error *err);
+// trace.c
+struct dem_guide;
+/** Opens the file that contact.trace asks for; resumed: what it holds after `time` is cut. */
+silt_status silt_trace_open(silt_coupling *coupling, const char *path, bool resumed, double time, silt_error *err);
+int silt_trace_count(const silt_coupling *coupling); /**< forces in a row */
+void silt_trace_ask(const silt_coupling *coupling, struct dem_guide *guide);
+silt_status silt_trace_write(silt_coupling *coupling, const struct dem_guide *told, silt_error *err);
 /** where the path of a prescribed body has it at a time: x, y, z in m, angle in radians */
 void silt_coupling_place(const silt_coupling *coupling, int body, double time, double place[4]);
 

@@ -536,14 +536,36 @@ static void worker_walls(int substep) {
     script_motion(worker.lmp, s, (const double(*)[4])worker.rate);
 }
 
+// contact forces at the end of a substep: on grains all forces less weight and load, on bodies what they are told
+static void worker_trace(int substep) {
+    const dem_shared *s = worker.shared;
+    dem_guide *guide = worker_guide();
+    const dem_traced *traced = dem_guide_traced(guide);
+    double *out = dem_guide_trace(guide) + 3 * (size_t)substep * (size_t)guide->n_trace;
+    if (guide->n_trace == 0)
+        return;
+    worker_atoms a = worker_look();
+    double **load = lammps_extract_fix(worker.lmp, "dragforce", 1, 2, 0, 0);
+    worker_index(&a);
+    for (int k = 0; k < guide->n_trace; k++, out += 3) {
+        const int i = traced[k].order >= 0 && traced[k].order < worker.n_order ? worker_find(worker.order[traced[k].order]) : -1;
+        for (int c = 0; c < 3 && traced[k].slot < 0; c++)
+            out[c] = i >= 0 ? a.force[i][c] - load[i][c] - a.mass[i] * s->gravity[c] : NAN;
+        if (traced[k].slot >= 0)
+            motion_contact(traced[k].slot, out);
+    }
+}
+
 static void worker_advance(int n_step) {
     const double since = worker_seconds(CLOCK_MONOTONIC), cpu = worker_seconds(CLOCK_PROCESS_CPUTIME_ID);
     const dem_guide *guide = worker_guide();
     motion_run();
-    if (guide && guide->n_wall)
+    if (guide && (guide->n_wall || guide->n_trace))
         for (int k = 0; k < n_step; k++) {
-            worker_walls(k);
+            if (guide->n_wall)
+                worker_walls(k);
             script_run(worker.lmp, 1);
+            worker_trace(k);
         }
     else
         script_run(worker.lmp, n_step);

@@ -15,6 +15,8 @@ typedef struct silt_coupling_def {
     const silt_bed *bed;     // borrowed, NULL without bed
     const char *worker;      // path of silt-dem
     const char *log;         // OUT/dem.log
+    const char *trace;       // OUT/trace.csv
+    bool resumed;            // the run goes on from a checkpoint
     double lo[3], hi[3];     // the domain's box (with margin): what leaves it has left
     double way_lo[3], way_hi[3]; // m, what walls with a motion span from the start to the end
 } silt_coupling_def;

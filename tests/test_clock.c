@@ -1,5 +1,5 @@
-// Clocks count whole frames: a run that begins after a year, 3.15e7 s, goes on for 1e4 steps with the bits of one that begins at 0, and
-// its time is off by no step's rounding.
+// Clocks count whole frames: a run that begins after a year, 3.15e7 s, goes on for 1e4 steps with the bits of one that
+// begins at 0, and its time is off by no step's rounding.
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,8 +13,8 @@
 #include "scene_text.h"
 
 #define OUTPUT 100.0
-#define YEAR 315000 // frames of OUTPUT
-#define STEPS 10000
+#define YEAR   315000 // frames of OUTPUT
+#define STEPS  10000
 
 static silt_run began(const silt_scene *scene, const char *folder, int64_t frame) {
     static const silt_run_def def = {.quiet = true, .threads = 1, .worker = SILT_BINARY "/silt-dem"};
@@ -40,8 +40,8 @@ static void same_after_a_year(const char *text, int steps, double least) {
         OK(silt_run_advance(&a, &error));
         OK(silt_run_advance(&b, &error));
         if (a.dt != b.dt || a.offset != b.offset || b.frame != a.frame + YEAR)
-            fail_msg("step %d: dt %.17g and %.17g, %.17g and %.17g into frames %lld and %lld", k + 1, a.dt, b.dt, a.offset, b.offset, (long long)a.frame,
-                     (long long)b.frame);
+            fail_msg("step %d: dt %.17g and %.17g, %.17g and %.17g into frames %lld and %lld", k + 1, a.dt, b.dt,
+                     a.offset, b.offset, (long long)a.frame, (long long)b.frame);
     }
     const size_t n = (size_t)silt_nodes_dim(&a.nodes) * (size_t)a.nodes.count * sizeof(double);
     assert_int_equal(a.nodes.count, b.nodes.count);
@@ -57,20 +57,24 @@ static void same_after_a_year(const char *text, int steps, double least) {
 
 static void test_water(void **state) {
     (void)state;
-    same_after_a_year("silt: 1\ntime: {end: 9.0e+7, output: 100, step: 0.0005, checkpoint: 1.0e+7}\ngravity: [0.5, -9.81]\n"
-                      "fluid: {density: 1000, viscosity: 0.01, flow: laminar, size: 0.1, regions: [{box: [[0, 0], [0.2, 0.2]]}]}\n"
-                      "walls: [{polyline: [[0, 1], [0, 0], [0.2, 0], [0.2, 1]], condition: slip}]\n",
-                      STEPS, 4.9);
+    same_after_a_year(
+        "silt: 1\ntime: {end: 9.0e+7, output: 100, step: 0.0005, checkpoint: 1.0e+7}\ngravity: [0.5, -9.81]\n"
+        "fluid: {density: 1000, viscosity: 0.01, flow: laminar, size: 0.1, regions: [{box: [[0, 0], [0.2, 0.2]]}]}\n"
+        "walls: [{polyline: [[0, 1], [0, 0], [0.2, 0], [0.2, 1]], condition: slip}]\n",
+        STEPS, 4.9);
 }
 
 static void test_grains(void **state) {
     (void)state;
-    same_after_a_year("silt: 1\ntime: {end: 9.0e+7, output: 100, step: 0.005, checkpoint: 1.0e+7}\ngravity: [0, -9.81]\n"
-                      "fluid: {density: 1000, viscosity: 0.01, flow: laminar, size: 0.1, regions: [{box: [[0, 0], [0.3, 0.3]]}]}\n"
-                      "walls: [{polyline: [[0, 1], [0, 0], [0.3, 0], [0.3, 1]], condition: slip}]\n"
-                      "grains: {list: [{at: [0.1, 0.2], diameter: 0.05, density: 2650}, {at: [0.2, 0.2], diameter: 0.05, density: 2650}]}\n"
-                      "contact: {youngs_modulus: 5.0e6, poissons_ratio: 0.3, restitution: 0.3, friction: 0.6, rolling_friction: 0.2}\n",
-                      200, 0.9);
+    same_after_a_year(
+        "silt: 1\ntime: {end: 9.0e+7, output: 100, step: 0.005, checkpoint: 1.0e+7}\ngravity: [0, -9.81]\n"
+        "fluid: {density: 1000, viscosity: 0.01, flow: laminar, size: 0.1, regions: [{box: [[0, 0], [0.3, 0.3]]}]}\n"
+        "walls: [{polyline: [[0, 1], [0, 0], [0.3, 0], [0.3, 1]], condition: slip}]\n"
+        "grains: {list: [{at: [0.1, 0.2], diameter: 0.05, density: 2650}, {at: [0.2, 0.2], diameter: 0.05, density: "
+        "2650}]}\n"
+        "contact: {youngs_modulus: 5.0e6, poissons_ratio: 0.3, restitution: 0.3, friction: 0.6, rolling_friction: "
+        "0.2}\n",
+        200, 0.9);
 }
 
 int main(void) {

@@ -1,4 +1,5 @@
-// silt study from inside: its keys, right and wrong; points of ranges; what a run left and how it is judged; lines through results
+// silt study from inside: its keys, right and wrong; points of ranges; what a run left and how it is judged; lines
+// through results
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -113,7 +114,8 @@ static void test_grid(void **state) {
     study s = read_text("study: 1\nscene: " SCENE "\nvary:\n"
                         "  - {key: a.b, values: [x, [1, 2.5], {k: 'y z'}]}\n"
                         "  - {key: c, log: [1.0e-6, 1.0e+6], count: 5}\n"
-                        "  - {key: d, linear: [0, 1], count: 3, form: '[0, -%]', with: [{key: e, factor: 2}, {key: f.0.g, form: '<%>'}]}\n");
+                        "  - {key: d, linear: [0, 1], count: 3, form: '[0, -%]', with: [{key: e, factor: 2}, {key: "
+                        "f.0.g, form: '<%>'}]}\n");
     assert_int_equal(study_count(&s), 45);
     // the last range runs fastest
     assert_string_equal(study_value(&s, 0, 0), "x");
@@ -138,7 +140,7 @@ static void test_grid(void **state) {
 
 static void test_random(void **state) {
     (void)state;
-#define DRAWN(seed, more)                                                                                                         \
+#define DRAWN(seed, more)                                                                                              \
     "study: 1\nscene: " SCENE "\nseed: " seed "\ncombine: together\nvary:\n  - {key: a, random: [2, 3], count: 400}\n" \
     "  - {key: b, log_random: [1.0e-3, 1.0e+3], count: 400}\n" more
     study s = read_text(DRAWN("5", "")), again = read_text(DRAWN("5", "")), other = read_text(DRAWN("6", ""));
@@ -163,18 +165,21 @@ static void test_random(void **state) {
 }
 
 // what a run left -------------------------------------------------------------------------------------
-#define SUMMARY(retries, volume) \
-    "{\"status\": \"done\", \"steps\": 2, \"steps_here\": 2, \"time\": 0.5, \"nodes\": 10, \"node_steps\": 24, \"retries\": " retries \
-    ", \"worst_volume_error\": " volume ", \"worst_sediment_error\": 0,\n" \
-    "\"checks\": [{\"name\": \"way\", \"value\": 0.11, \"error\": 0.1, \"pass\": false}, {\"name\": \"b\", \"value\": null, \"error\": null, \"pass\": false}]}"
+#define SUMMARY(retries, volume)                                                                                       \
+    "{\"status\": \"done\", \"steps\": 2, \"steps_here\": 2, \"time\": 0.5, \"nodes\": 10, \"node_steps\": 24, "       \
+    "\"retries\": " retries ", \"worst_volume_error\": " volume ", \"worst_sediment_error\": 0,\n"                     \
+    "\"checks\": [{\"name\": \"way\", \"value\": 0.11, \"error\": 0.1, \"pass\": false}, {\"name\": \"b\", "           \
+    "\"value\": null, \"error\": null, \"pass\": false}]}"
 #define HEADER "step,time,dt,kinetic_energy,potential_energy,external_work,centre_x\n"
-#define OWED_HEADER "step,time,dt,fluid_volume,volume_error,volume_owed,kinetic_energy,potential_energy,owed_energy,external_work\n"
+#define OWED_HEADER                                                                                                    \
+    "step,time,dt,fluid_volume,volume_error,volume_owed,kinetic_energy,potential_energy,owed_energy,external_work\n"
 
 static study_row judged(study *s, const char *summary, const char *history, const char *said, study_end end) {
     make("run.log", *said == '!' ? said + 1 : "");
-    static const char gauge[] = "silt: 1\ntime: {end: 1, output: 1}\ngravity: [0, -10]\n"
-                                "fluid: {density: 1000, viscosity: 0, flow: laminar, size: 0.1, regions: [{box: [[0, 0], [1, 2]]}]}\n"
-                                "gauges: [{name: centre, centroid_of: water}]\n";
+    static const char gauge[] =
+        "silt: 1\ntime: {end: 1, output: 1}\ngravity: [0, -10]\n"
+        "fluid: {density: 1000, viscosity: 0, flow: laminar, size: 0.1, regions: [{box: [[0, 0], [1, 2]]}]}\n"
+        "gauges: [{name: centre, centroid_of: water}]\n";
     char *path = silt_text("%s/summary.json", folder), *log = silt_text("%s/log", folder);
     unlink(path);
     make("scene.yaml", gauge);
@@ -189,11 +194,13 @@ static study_row judged(study *s, const char *summary, const char *history, cons
     return row;
 }
 
-static void ends(const char *summary, const char *history, const char *said, study_end end, study_status status, const char *reason) {
+static void ends(const char *summary, const char *history, const char *said, study_end end, study_status status,
+                 const char *reason) {
     study s = {.bounds = {.volume = 0.01, .mass = 1e-3, .sediment = 1e-9, .energy = 0.01}};
     study_row row = judged(&s, summary, history, said, end);
     if (study_row_status(&row) != status || !strstr(study_row_text(&row, "reason"), reason))
-        fail_msg("%s: %s; expected %s: %s", study_row_text(&row, "status"), study_row_text(&row, "reason"), study_status_word[status], reason);
+        fail_msg("%s: %s; expected %s: %s", study_row_text(&row, "status"), study_row_text(&row, "reason"),
+                 study_status_word[status], reason);
     study_row_clear(&row);
 }
 
@@ -205,21 +212,31 @@ static void test_statuses(void **state) {
     ends(SUMMARY("3", "1e-3"), sound, "", good, RUN_CUT, "3 steps cut");
     ends(SUMMARY("0", "0.011"), sound, "", good, RUN_WRONG, "volume error 0.011, allowed 0.01");
     // of what the run itself told it was warned, and that alone
-    ends(SUMMARY("2", "0.3"), sound, "!frame 1\nwarning: t = 1 s: the water's volume is off", good, RUN_WARNED, "warning: t = 1 s: the water's volume");
+    ends(SUMMARY("2", "0.3"), sound, "!frame 1\nwarning: t = 1 s: the water's volume is off", good, RUN_WARNED,
+         "warning: t = 1 s: the water's volume");
+    ends(SUMMARY("2", "0.3"), sound, "!warning: t = 0 s: the shear\nwarning: t = 1 s: the water's volume is off\n", good,
+         RUN_WARNED, "warning: t = 0 s: the shear");
     ends(SUMMARY("2", "0.3"), sound, "!warning: t = 1 s: the shear", good, RUN_WRONG, "volume error 0.3");
     ends(SUMMARY("0", "null"), sound, "", good, RUN_WRONG, "volume error nan");
-    ends(NULL, sound, "warning: a\nscene.yaml:1:2: key 'a': found", (study_end){.code = SILT_INPUT}, RUN_REFUSED, "scene.yaml:1:2: key 'a'");
-    ends(SUMMARY("0", "1e-3"), sound, "step 3 gave up\nthe last checkpoint", (study_end){.code = SILT_FAILED}, RUN_FAILED, "step 3 gave up");
+    ends(NULL, sound, "warning: a\nscene.yaml:1:2: key 'a': found", (study_end){.code = SILT_INPUT}, RUN_REFUSED,
+         "scene.yaml:1:2: key 'a'");
+    ends(SUMMARY("0", "1e-3"), sound, "step 3 gave up\nthe last checkpoint", (study_end){.code = SILT_FAILED},
+         RUN_FAILED, "step 3 gave up");
     ends(NULL, sound, "", (study_end){.code = SILT_FAILED}, RUN_CRASHED, "exit code 1 without a word");
+    ends(SUMMARY("0", "0"), sound, "stopped by time.wall", (study_end){.code = SILT_STOPPED}, RUN_UNFINISHED,
+         "stopped by time.wall");
     ends(NULL, sound, "", (study_end){.code = 77}, RUN_CRASHED, "exit code 77");
     ends(NULL, sound, "", good, RUN_CRASHED, "no summary.json");
-    ends(NULL, sound, "malloc: corrupted", (study_end){.code = -1, .signal = 11}, RUN_CRASHED, "signal 11: malloc: corrupted");
-    ends(NULL, sound, "", (study_end){.code = -1, .signal = 9, .late = true, .stalled = true, .cpu = 2}, RUN_HUNG, "stopped after 2 s");
+    ends(NULL, sound, "malloc: corrupted", (study_end){.code = -1, .signal = 11}, RUN_CRASHED,
+         "signal 11: malloc: corrupted");
+    ends(NULL, sound, "", (study_end){.code = -1, .signal = 9, .late = true, .stalled = true, .cpu = 2}, RUN_HUNG,
+         "stopped after 2 s");
     ends(NULL, sound, "", (study_end){.code = -1, .signal = 9, .late = true}, RUN_UNFINISHED, "stopped after");
     // a column that is none, in a run that ended well or not; gauges may have gaps
     static const char broken[] = HEADER "0,0,0,5,7,0,1\n1,0.2,0.2,4,nan,0,1\n";
     ends(SUMMARY("0", "1e-3"), broken, "", good, RUN_WRONG, "no number in column potential_energy at t = 0.2 s");
-    ends(SUMMARY("0", "1e-3"), broken, "gave up", (study_end){.code = SILT_FAILED}, RUN_WRONG, "no number in column potential_energy");
+    ends(SUMMARY("0", "1e-3"), broken, "gave up", (study_end){.code = SILT_FAILED}, RUN_WRONG,
+         "no number in column potential_energy");
 }
 
 // 2 m3 of water that stands 2 m high in g = 10 m/s2 can give up 20 kJ/m; 5 J of motion, 100 J of work
@@ -227,7 +244,8 @@ static void test_energy(void **state) {
     (void)state;
     study s = {.bounds = {.volume = 0.01, .mass = 1e-3, .sediment = 1e-9, .energy = 0.01}};
     const study_end good = {.cpu = 1};
-    study_row row = judged(&s, SUMMARY("0", "0"), HEADER "0,0,0,0,0,0,1\n1,0.2,0.2,400,-90,100,1\n2,0.5,0.3,0,-90,100,1\n", "", good);
+    study_row row = judged(&s, SUMMARY("0", "0"),
+                           HEADER "0,0,0,0,0,0,1\n1,0.2,0.2,400,-90,100,1\n2,0.5,0.3,0,-90,100,1\n", "", good);
     near(study_row_number(&row, "energy_excess"), 210 / (20000.0 + 400 + 90 + 100), 1e-5, "excess");
     assert_int_equal(study_row_status(&row), RUN_WRONG);
     assert_non_null(strstr(study_row_text(&row, "reason"), "energy 0.0102 above"));
@@ -238,13 +256,15 @@ static void test_energy(void **state) {
     assert_int_equal(study_row_status(&row), RUN_OK);
     study_row_clear(&row);
     // 0.1 m3 of 2 are owed with 300 J of 500: neither is lost
-    row = judged(&s, SUMMARY("0", "5e-3"), OWED_HEADER "0,0,0,2,0,0,0,500,0,0\n1,0.2,0.2,1.9,-0.05,0.1,0,200,300,0\n", "", good);
+    row = judged(&s, SUMMARY("0", "5e-3"), OWED_HEADER "0,0,0,2,0,0,0,500,0,0\n1,0.2,0.2,1.9,-0.05,0.1,0,200,300,0\n",
+                 "", good);
     near(study_row_number(&row, "energy_excess"), 0, 0, "excess");
     near(study_row_number(&row, "mass_error"), 0, 1e-15, "mass");
     assert_int_equal(study_row_status(&row), RUN_OK);
     study_row_clear(&row);
     // 0.0025 of it is
-    row = judged(&s, SUMMARY("0", "5e-3"), OWED_HEADER "0,0,0,2,0,0,0,500,0,0\n1,0.2,0.2,1.9,-0.05,0.095,0,200,300,0\n", "", good);
+    row = judged(&s, SUMMARY("0", "5e-3"), OWED_HEADER "0,0,0,2,0,0,0,500,0,0\n1,0.2,0.2,1.9,-0.05,0.095,0,200,300,0\n",
+                 "", good);
     near(study_row_number(&row, "mass_error"), 0.0025, 1e-12, "mass");
     assert_int_equal(study_row_status(&row), RUN_WRONG);
     study_row_clear(&row);
@@ -286,15 +306,22 @@ static void test_slope(void **state) {
         *row = (study_row){0};
         // the last two do not count: a run that failed, an error of nought
         study_row_add(row, "status", "%s", k == 4 ? "failed" : "ok");
+        study_row_add(row, "odd", k % 2 ? "yes" : "no");
         study_row_add(row, "h", "%.17g", h);
         study_row_add(row, "e", "%.17g", k == 4 ? 1000 : k == 5 ? 0 : 3 * h * h * sqrt(h));
     }
     double slope, at_one;
-    assert_int_equal(study_slope(&table, "h", "e", &slope, &at_one), 4);
+    assert_int_equal(study_slope(&table, "h", "e", NULL, NULL, &slope, &at_one), 4);
     near(slope, 2.5, 1e-12, "order");
     near(at_one, 3, 1e-12, "error at h = 1");
-    assert_int_equal(study_slope(&table, "absent", "e", &slope, &at_one), 0);
+    assert_int_equal(study_slope(&table, "absent", "e", NULL, NULL, &slope, &at_one), 0);
     assert_true(isnan(slope));
+    // of the rows of one value: e = 3 h^2.5 all the same
+    assert_string_equal(study_distinct(&table, "odd", 0), "no");
+    assert_string_equal(study_distinct(&table, "odd", 1), "yes");
+    assert_null(study_distinct(&table, "odd", 2));
+    assert_int_equal(study_slope(&table, "h", "e", "odd", "yes", &slope, &at_one), 2);
+    near(slope, 2.5, 1e-12, "order of the odd rows");
     study_table_clear(&table);
 }
 
@@ -316,9 +343,9 @@ int main(int argc, char **argv) {
         return 0;
     }
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_wrong),    cmocka_unit_test(test_document), cmocka_unit_test(test_help), cmocka_unit_test(test_grid),
-        cmocka_unit_test(test_random),   cmocka_unit_test(test_statuses), cmocka_unit_test(test_energy), cmocka_unit_test(test_row),
-        cmocka_unit_test(test_slope),
+        cmocka_unit_test(test_wrong),  cmocka_unit_test(test_document), cmocka_unit_test(test_help),
+        cmocka_unit_test(test_grid),   cmocka_unit_test(test_random),   cmocka_unit_test(test_statuses),
+        cmocka_unit_test(test_energy), cmocka_unit_test(test_row),      cmocka_unit_test(test_slope),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

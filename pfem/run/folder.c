@@ -36,6 +36,7 @@ static void out_clear(const char *out) {
                                        "run.log",
                                        "history.csv",
                                        "dem.log",
+                                       "trace.csv",
                                        "run.h5",
                                        "*.hdf.series",
                                        "*_[0-9][0-9][0-9][0-9][0-9][0-9].hdf",

@@ -51,6 +51,7 @@ static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_
     *run = (silt_run){.scene = scene, .def = *def, .saved_step = -1, .lock = lock, .n_shown = -1};
     run->out = silt_text("%s", out);
     run->log = silt_text("%s/dem.log", out);
+    run->trace = silt_text("%s/trace.csv", out);
     run->worker = silt_worker_find(def->worker);
     run->started = silt_seconds();
     silt_clock_reset();

@@ -133,13 +133,14 @@ static silt_step water_see(silt_run *run) {
     return step;
 }
 
-static silt_status water_gave_up(const silt_run *run, int tries, silt_error *err) {
+static silt_status water_gave_up(const silt_run *run, int tries, bool least, silt_error *err) {
     char why[sizeof err->text];
     snprintf(why, sizeof why, "%s", err ? err->text : "");
     if (err)
         *err = (silt_error){0};
-    return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s gave up after %d tries, the last with dt = %.3g s: %s",
-                     (long long)run->step + 1, run->time, tries, run->dt, why);
+    return silt_fail(err, SILT_FAILED, "step %lld at t = %.9g s gave up after %d tries, the last with dt = %.3g s%s: %s",
+                     (long long)run->step + 1, run->time, tries, run->dt,
+                     least ? ", which is one of the grains' and cannot be halved (contact.step, contact.youngs_modulus)" : "", why);
 }
 
 static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
@@ -174,7 +175,7 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         water_restore(run);
         const bool least = run->coupling && *n <= 1;
         if (attempt >= scene->time.retries || least)
-            return water_gave_up(run, attempt + 1, err);
+            return water_gave_up(run, attempt + 1, least, err);
         if (err)
             *err = (silt_error){0};
         run->summary.retries++;
@@ -316,7 +317,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         if (status == SILT_OK)
             break;
         if (!grains_again(run, &n, attempt, err))
-            return moved ? water_gave_up(run, attempt + 1, err) : silt_run_grains_failed(run, status, err);
+            return moved ? water_gave_up(run, attempt + 1, n <= 1, err) : silt_run_grains_failed(run, status, err);
     }
     if (scene->fluid.on && silt_run_bodies_free(run) && silt_seep_on(scene))
         silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
@@ -456,4 +457,5 @@ void silt_run_free(silt_run *run) {
     free(run->out);
     free(run->worker);
     free(run->log);
+    free(run->trace);
 }

@@ -29,6 +29,7 @@ struct silt_run {
     silt_run_def def;
     char *out;        // owned
     char *worker;     // owned
+    char *trace;      // owned
     char *log;        // owned
 
     silt_walls walls;

@@ -2,6 +2,7 @@
 #include "run.h"
 #include "solid.h"
 
+#define GRAIN_CELLS 2.0 // largest diameter of a grain in cells without a word
 #define WATER_MADE 0.1 // largest share by which the first cells may miss the regions without a word
 
 static bool run_solid(const void *context, const double *x, double margin) {
@@ -33,7 +34,8 @@ void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def) {
                                .walls = &run->walls,
                                .bed = run->scene->bed.on ? &run->bed : NULL,
                                .worker = run->worker,
-                               .log = run->log};
+                               .log = run->log,
+                               .trace = run->trace};
     memcpy(def->lo, run->box_lo, sizeof def->lo);
     memcpy(def->hi, run->box_hi, sizeof def->hi);
     memcpy(def->way_lo, run->way_lo, sizeof def->way_lo);
@@ -182,6 +184,18 @@ static silt_status water_there(const silt_run *run, silt_error *err) {
     return SILT_OK;
 }
 
+// grains are points to the water, which takes their volume by a kernel some diameters wide
+static void grains_small(const silt_run *run) {
+    const silt_scene *scene = run->scene;
+    double largest = 0;
+    for (int k = 0; k < silt_scene_grains(scene); k++)
+        if (!silt_scene_grain(scene, k)->fixed)
+            largest = silt_max(largest, silt_scene_grain(scene, k)->diameter);
+    if (largest > GRAIN_CELLS * scene->fluid.size * (1 + 1e-9))
+        silt_run_warn(run, "a grain of %.3g m in water with cells of %.3g m: grains are points to the water, right up to %g cells; larger ones are bodies", largest,
+                      scene->fluid.size, GRAIN_CELLS);
+}
+
 silt_status silt_run_first(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     if (scene->bed.on)
@@ -233,6 +247,7 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
         silt_nodes_seed(&run->nodes, scene, &run->walls, run_solid, &run->barrier);
     SILT_TRY(silt_mesh_first(&run->mesh, &run->nodes, scene, &run->barrier, err));
     SILT_TRY(water_there(run, err));
+    grains_small(run);
     silt_size_update(run->size, &run->nodes, &run->mesh);
     SILT_TRY(silt_run_pockets(run, err));
     // nodes of the cloud that got no cell at the start are no drops: they hold no water

@@ -120,6 +120,7 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
     if (silt_scene_has_dem(scene)) {
         silt_coupling_def def;
         silt_coupling_def_fill(run, &def);
+        def.resumed = true;
         SILT_TRY(silt_coupling_dem.load_state(&run->coupling, &def, store, err));
         run->barrier.bodies = silt_coupling_dem.bodies(run->coupling);
     }

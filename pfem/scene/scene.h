@@ -285,6 +285,7 @@ typedef struct silt_contact_def {
     double rolling_friction;
     double body_friction;    // bodies against anything; default friction
     double step;             // share of the Rayleigh time, default 0.15
+    bool trace;              // contact forces of every substep into a file, default false
 } silt_contact_def;
 
 typedef enum {

@@ -521,6 +521,9 @@ static const silt_key contact_rows[] = {
      .doc = "sliding friction of bodies against anything"},
     {"step", KEY_NUMBER, .fallback = "0.15", .flags = KEY_OPEN_LOW, RANGE(0, 0.5), AT(silt_contact_def, step),
      .doc = "time step of the contacts as a share of the Rayleigh time"},
+    {"trace", KEY_SWITCH, .fallback = "false", AT(silt_contact_def, trace),
+     .doc = "writes OUT/trace.csv: the contact force on every body that is not fixed and on the grain of every gauge grain_force at the end of "
+            "every substep of the contacts"},
     {0}};
 TABLE(contact, "the contact block", silt_contact_def, -1);
 

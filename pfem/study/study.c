@@ -33,7 +33,9 @@ static silt_status study_folder(const char *out, silt_error *err) {
     if (!made && errno != EEXIST)
         status = silt_fail(err, SILT_FAILED, "%s: cannot be made (%s)", out, strerror(errno));
     else if (!made && access(runs, F_OK) != 0 && rmdir(out) != 0)
-        status = silt_fail(err, SILT_INPUT, "%s: found something else than the results of a study, allowed: a new folder with -o, or that of a study, which goes on",
+        status = silt_fail(err, SILT_INPUT,
+                           "%s: found something else than the results of a study, allowed: a new folder with -o, or "
+                           "that of a study, which goes on",
                            out);
     else {
         mkdir(out, 0777);
@@ -48,7 +50,8 @@ static silt_status study_folder(const char *out, silt_error *err) {
 
 // text as one word of a shell
 static void plan_word(const char *text) {
-    if (*text && strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./=+,:") == strlen(text)) {
+    if (*text &&
+        strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./=+,:") == strlen(text)) {
         printf(" %s", text);
         return;
     }
@@ -61,7 +64,9 @@ static void plan_word(const char *text) {
 // absolute names, since the commands may run from anywhere
 static void plan_place(const char *path) {
     char *full = realpath(path, NULL), *here = full ? NULL : realpath(".", NULL);
-    char *made = full ? silt_text("%s", full) : *path == '/' || !here ? silt_text("%s", path) : silt_text("%s/%s", here, path);
+    char *made = full                    ? silt_text("%s", full)
+                 : *path == '/' || !here ? silt_text("%s", path)
+                                         : silt_text("%s/%s", here, path);
     plan_word(made);
     free(made);
     free(here);
@@ -102,7 +107,9 @@ static silt_status job_lost(const study *s, const char *out, int k, int code, si
         for (int r = 0; r < s->n_range; r++)
             study_row_add(&row, s->range[r].key, "%s", study_value(s, k, r));
         study_row_add(&row, "status", "%s", study_status_word[RUN_CRASHED]);
-        study_row_add(&row, "reason", "the study's own process was ended by signal %d while it read the scene or the results", WTERMSIG(code));
+        study_row_add(&row, "reason",
+                      "the study's own process was ended by signal %d while it read the scene or the results",
+                      WTERMSIG(code));
         status = study_row_write(&row, path, err);
     }
     study_row_clear(&row);
@@ -186,7 +193,8 @@ silt_status silt_study(const silt_study_def *def, FILE *to, silt_error *err) {
         goto done;
     study_points(&s);
     if (def->only > study_count(&s)) {
-        status = silt_fail(err, SILT_INPUT, "--run %d: allowed 1 to %d, the jobs of %s", def->only, study_count(&s), def->path);
+        status = silt_fail(err, SILT_INPUT, "--run %d: allowed 1 to %d, the jobs of %s", def->only, study_count(&s),
+                           def->path);
         goto done;
     }
     if (def->plan) {

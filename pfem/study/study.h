@@ -1,7 +1,8 @@
 /** @file study.h
- * silt study: one scene over ranges of its keys; every run in a process of its own, what it gave in a row of study.csv, plots.
- * Flow: study_keys.c (file -> struct) -> study_points.c (ranges -> points) -> study.c (points -> jobs in parallel) ->
- * study_run.c (one run: child, limits, row file) -> study_result.c (what a run left -> row) -> study_collect.c (rows -> study.csv)
+ * silt study: one scene over ranges of its keys; every run in a process of its own, what it gave in a row of study.csv,
+ * plots. Flow: study_keys.c (file -> struct) -> study_points.c (ranges -> points) -> study.c (points -> jobs in
+ * parallel) -> study_run.c (one run: child, limits, row file) -> study_result.c (what a run left -> row) ->
+ * study_collect.c (rows -> study.csv)
  * -> study_plot.c, study_report.c (study.csv -> SVG, study.md).
  */
 #ifndef SILT_STUDY_H
@@ -12,20 +13,20 @@
 
 /** what the command line asks for */
 typedef struct silt_study_def {
-    const char *path;       // the study's file
-    const char *out;        // folder of the results; NULL: by the file's name in the current folder
-    int jobs;               // how many at once; 0: one
-    int only;               // this job alone, from 1; 0: all
-    bool plan;              // print a command per job and do nothing
-    bool collect;           // rows to study.csv and plots alone
+    const char *path; // the study's file
+    const char *out;  // folder of the results; NULL: by the file's name in the current folder
+    int jobs;         // how many at once; 0: one
+    int only;         // this job alone, from 1; 0: all
+    bool plan;        // print a command per job and do nothing
+    bool collect;     // rows to study.csv and plots alone
     bool force, quiet;
     int n_set;
     const char *const *set; // -D, keys of the study
     const char *worker;     // see silt_run_def
 } silt_study_def;
 
-/** Does, plans or collects a study; prints a table of what came of it. SILT_INPUT: a wrong file; SILT_FAILED: a run that crashed, hung or is wrong
- * (a run that failed or was refused is a result). */
+/** Does, plans or collects a study; prints a table of what came of it. SILT_INPUT: a wrong file; SILT_FAILED: a run
+ * that crashed, hung or is wrong (a run that failed or was refused is a result). */
 silt_status silt_study(const silt_study_def *def, FILE *to, silt_error *err);
 /** silt_scene_help for the keys of a study */
 silt_status silt_study_help(const char *key, FILE *to, silt_error *err);
@@ -47,7 +48,7 @@ typedef struct study_range {
     char **value; // owned, RANGE_VALUES
     double low, high;
     int n_text;
-    char **text;  // owned, the values of any kind as texts (study_points)
+    char **text; // owned, the values of any kind as texts (study_points)
     int n_with;
     study_with *with; // owned
 } study_range;
@@ -69,7 +70,7 @@ typedef struct study_seek {
 typedef enum { PLOT_TIME = 1, PLOT_ORDER, PLOT_COST, PLOT_MAP } study_plot_kind;
 typedef struct study_plot {
     study_plot_kind kind;
-    char *name, *x, *y, *check; // owned
+    char *name, *x, *y, *check, *by; // owned
 } study_plot;
 
 typedef enum { COMBINE_GRID = 0, COMBINE_TOGETHER } study_combine;
@@ -107,11 +108,22 @@ int study_count(const study *s); // points
 /** text of range r at point k */
 const char *study_value(const study *s, int k, int r);
 /** appends what a key and those that go with it become as -D takes it; the texts are owned by the caller */
-void study_assign(char ***set, int *n_set, int *capacity, const char *key, const char *form, int n_with, const study_with *with,
-                  const char *value);
+void study_assign(char ***set, int *n_set, int *capacity, const char *key, const char *form, int n_with,
+                  const study_with *with, const char *value);
 
 // one run -----------------------------------------------------------------------------------------------
-typedef enum { RUN_OK = 0, RUN_CUT, RUN_WARNED, RUN_REFUSED, RUN_FAILED, RUN_UNFINISHED, RUN_HUNG, RUN_CRASHED, RUN_WRONG, RUN_STATUS_COUNT } study_status;
+typedef enum {
+    RUN_OK = 0,
+    RUN_CUT,
+    RUN_WARNED,
+    RUN_REFUSED,
+    RUN_FAILED,
+    RUN_UNFINISHED,
+    RUN_HUNG,
+    RUN_CRASHED,
+    RUN_WRONG,
+    RUN_STATUS_COUNT
+} study_status;
 extern const char *const study_status_word[RUN_STATUS_COUNT];
 
 /** one cell of a row; rows are lists of them, so that each run may have other columns */
@@ -133,19 +145,19 @@ bool study_row_read(study_row *row, const char *path);
 
 /** how the child ended */
 typedef struct study_end {
-    int code;             // exit code, -1: by a signal
+    int code; // exit code, -1: by a signal
     int signal;
-    bool late, stalled;   // the limit came; no step in the last half of the time
-    double cpu, wall;     // s
-    double memory;        // bytes, peak
+    bool late, stalled; // the limit came; no step in the last half of the time
+    double cpu, wall;   // s
+    double memory;      // bytes, peak
 } study_end;
 /** what a run left in its folder and log, as cells of the row (study_result.c) */
 void study_result(const study *s, const char *out, const char *log, const study_end *end, study_row *row);
 
 /** Runs the scene with these -D in OUT/runs/NAME.out, or takes the row of an earlier such run; row: what came of it.
  * @param head  cells that the row begins with */
-silt_status study_run(const study *s, const silt_study_def *def, const char *out, const char *name, int n_set, char *const *set,
-                      const study_row *head, study_row *row, silt_error *err);
+silt_status study_run(const study *s, const silt_study_def *def, const char *out, const char *name, int n_set,
+                      char *const *set, const study_row *head, study_row *row, silt_error *err);
 /** job k, from 0: the repeats of a point, or its search */
 silt_status study_job(const study *s, const silt_study_def *def, const char *out, int k, silt_error *err);
 
@@ -159,8 +171,18 @@ silt_status study_collect(const study *s, const char *out, study_table *table, s
 void study_table_clear(study_table *table);
 /** plots that are asked for, or those that suit; a missing gnuplot is told to `to`, and the CSV stays */
 silt_status study_plots(const study *s, const char *out, const study_table *table, FILE *to, silt_error *err);
-/** a least-squares line through the logarithms of what is positive in both; @return points used */
-int study_slope(const study_table *table, const char *x, const char *y, double *slope, double *at_one);
+/** a least-squares line through the logarithms of what is positive in both; by: of the rows that have this value there,
+ * NULL: of all.
+ * @return points used */
+int study_slope(const study_table *table, const char *x, const char *y, const char *by, const char *value,
+                double *slope, double *at_one);
+/** the k-th of the different values in a column, in the order of the rows; NULL: there are no more (by NULL: one, "")
+ */
+const char *study_distinct(const study_table *table, const char *by, int k);
+/** the row is of that value */
+bool study_row_of(const study_row *row, const char *by, const char *value);
+/** columns that a plot is drawn over; y is the caller's to free */
+void study_axes(const study *s, const study_table *table, const study_plot *plot, const char **x, char **y);
 /** OUT/study.md: maps in characters, reasons, orders; the short form to `to` */
 silt_status study_report(const study *s, const char *out, const study_table *table, FILE *to, silt_error *err);
 

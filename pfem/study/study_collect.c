@@ -84,11 +84,32 @@ silt_status study_collect(const study *s, const char *out, study_table *table, s
     return status;
 }
 
-int study_slope(const study_table *table, const char *x, const char *y, double *slope, double *at_one) {
+bool study_row_of(const study_row *row, const char *by, const char *value) {
+    const char *text = by ? study_row_text(row, by) : "";
+    return !by || (text && strcmp(text, value) == 0);
+}
+
+const char *study_distinct(const study_table *table, const char *by, int k) {
+    if (!by)
+        return k == 0 ? "" : NULL;
+    for (int i = 0; i < table->n; i++) {
+        const char *text = study_row_text(&table->row[i], by);
+        bool known = !text;
+        for (int j = 0; j < i && !known; j++)
+            known = study_row_of(&table->row[j], by, text);
+        if (!known && k-- == 0)
+            return text;
+    }
+    return NULL;
+}
+
+int study_slope(const study_table *table, const char *x, const char *y, const char *by, const char *value,
+                double *slope, double *at_one) {
     double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
     for (int i = 0; i < table->n; i++) {
         const double a = study_row_number(&table->row[i], x), b = study_row_number(&table->row[i], y);
-        if (study_row_status(&table->row[i]) > RUN_WARNED || !(a > 0) || !(b > 0) || !isfinite(a) || !isfinite(b))
+        if (study_row_status(&table->row[i]) > RUN_WARNED || !study_row_of(&table->row[i], by, value) || !(a > 0) ||
+            !(b > 0) || !isfinite(a) || !isfinite(b))
             continue;
         const double u = log(a), v = log(b);
         n++;

@@ -7,13 +7,18 @@
 
 #include "study.h"
 
-static bool row_counts(const study_row *row) { return study_row_status(row) <= RUN_WARNED; }
+static bool row_counts(const study_row *row) {
+    return study_row_status(row) <= RUN_WARNED;
+}
 
 // a title as gnuplot takes it in double quotes
 static void plot_quote(FILE *to, const char *text) {
     fputc('"', to);
     for (; *text; text++)
-        fprintf(to, *text == '"' || *text == '\\' ? "\\%c" : *text == '_' || *text == '^' || *text == '@' || *text == '{' || *text == '}' ? "\\\\%c" : "%c",
+        fprintf(to,
+                *text == '"' || *text == '\\'                                                  ? "\\%c"
+                : *text == '_' || *text == '^' || *text == '@' || *text == '{' || *text == '}' ? "\\\\%c"
+                                                                                               : "%c",
                 *text);
     fputc('"', to);
 }
@@ -23,11 +28,13 @@ typedef struct plot_files {
     char *data, *script, *picture; // owned
 } plot_files;
 
-static FILE *script_begin(const plot_files *files, const study *s, const study_plot *plot, const char *x, const char *y) {
+static FILE *script_begin(const plot_files *files, const study *s, const study_plot *plot, const char *x,
+                          const char *y) {
     FILE *to = fopen(files->script, "w");
     if (!to)
         return NULL;
-    fprintf(to, "set terminal svg size 640,480 background 'white'\nset output '%s'\nset grid\nset title ", files->picture);
+    fprintf(to, "set terminal svg size 640,480 background 'white'\nset output '%s'\nset grid\nset title ",
+            files->picture);
     char *title = silt_text("%s: %s", s->title && *s->title ? s->title : "study", plot->name);
     plot_quote(to, title);
     free(title);
@@ -39,9 +46,11 @@ static FILE *script_begin(const plot_files *files, const study *s, const study_p
     return to;
 }
 
-// points of x and y, and in a second block those that no other beats in both (in y where that is all that counts)
-static int data_points(const char *path, const study_table *table, const char *x, const char *y, bool front) {
-    FILE *to = fopen(path, "w");
+// points of x and y, added to the file as a block; or alone, and in a second block those that no other beats in both
+// (in y where that is all that counts)
+static int data_points(const char *path, const study_table *table, const char *x, const char *y, const char *by,
+                       const char *value, bool front) {
+    FILE *to = fopen(path, front ? "w" : "a");
     int n = 0;
     for (int pass = 0; pass < (front ? 2 : 1) && to; pass++) {
         double last = -HUGE_VAL;
@@ -49,7 +58,7 @@ static int data_points(const char *path, const study_table *table, const char *x
         if (pass == 0)
             for (int i = 0; i < table->n; i++) {
                 const double a = study_row_number(&table->row[i], x), b = study_row_number(&table->row[i], y);
-                if (row_counts(&table->row[i]) && a > 0 && b > 0) {
+                if (row_counts(&table->row[i]) && study_row_of(&table->row[i], by, value) && a > 0 && b > 0) {
                     fprintf(to, "%.9g %.9g\n", a, b);
                     n++;
                 }
@@ -60,7 +69,8 @@ static int data_points(const char *path, const study_table *table, const char *x
             double best_a = HUGE_VAL, best_b = HUGE_VAL;
             for (int i = 0; i < table->n; i++) {
                 const double a = study_row_number(&table->row[i], x), b = study_row_number(&table->row[i], y);
-                if (row_counts(&table->row[i]) && a > 0 && b > 0 && b < least && a >= last && (a < best_a || (a == best_a && b < best_b))) {
+                if (row_counts(&table->row[i]) && a > 0 && b > 0 && b < least && a >= last &&
+                    (a < best_a || (a == best_a && b < best_b))) {
                     best_a = a;
                     best_b = b;
                 }
@@ -72,26 +82,56 @@ static int data_points(const char *path, const study_table *table, const char *x
             }
         }
     }
+    if (to && !front && n)
+        fprintf(to, "\n\n");
     if (to)
         fclose(to);
     return n;
 }
 
-static bool plot_line(const plot_files *files, const study *s, const study_plot *plot, const study_table *table, const char *x, const char *y) {
-    const bool front = plot->kind == PLOT_TIME;
-    if (data_points(files->data, table, x, y, front) == 0)
+// error over time with the Pareto front
+static bool plot_time(const plot_files *files, const study *s, const study_plot *plot, const study_table *table,
+                      const char *x, const char *y) {
+    if (data_points(files->data, table, x, y, NULL, NULL, true) == 0)
         return false;
     FILE *to = script_begin(files, s, plot, x, y);
     if (!to)
         return false;
-    double slope, at_one;
-    const int n = study_slope(table, x, y, &slope, &at_one);
-    fprintf(to, "set logscale xy\nset format x '%%.2g'\nset format y '%%.2g'\nset key top %s\n", front ? "right" : "left");
-    fprintf(to, "plot '%s' index 0 with points pt 7 title 'runs'", files->data);
-    if (front)
-        fprintf(to, ", '' index 1 with linespoints pt 6 lw 2 title 'Pareto front'");
-    else if (n > 1 && isfinite(slope))
-        fprintf(to, ", %.9g * x**%.9g with lines lw 2 title 'slope %.2f'", at_one, slope, slope);
+    fprintf(to, "set logscale xy\nset format x '%%.2g'\nset format y '%%.2g'\nset key top right\n");
+    fprintf(
+        to,
+        "plot '%s' index 0 with points pt 7 title 'runs', '' index 1 with linespoints pt 6 lw 2 title 'Pareto front'\n",
+        files->data);
+    fclose(to);
+    return true;
+}
+
+// lines of one value of `by` each, with their orders
+static bool plot_line(const plot_files *files, const study *s, const study_plot *plot, const study_table *table,
+                      const char *x, const char *y) {
+    int n = 0, block = 0;
+    const char *value;
+    unlink(files->data);
+    for (int k = 0; (value = study_distinct(table, plot->by, k)); k++)
+        n += data_points(files->data, table, x, y, plot->by, value, false);
+    FILE *to = n ? script_begin(files, s, plot, x, y) : NULL;
+    if (!to)
+        return false;
+    fprintf(to, "set logscale xy\nset format x '%%.2g'\nset format y '%%.2g'\nset key bottom right\nplot ");
+    for (int k = 0; (value = study_distinct(table, plot->by, k)); k++) {
+        double slope, at_one;
+        const int m = study_slope(table, x, y, plot->by, value, &slope, &at_one);
+        if (m == 0)
+            continue;
+        fprintf(to, "%s'%s' index %d with points pt 7 lc %d ", block ? ", " : "", files->data, block, block + 1);
+        char *title = plot->by ? silt_text("%s %s", plot->by, value) : silt_text("runs");
+        fprintf(to, "title ");
+        plot_quote(to, title);
+        free(title);
+        if (m > 1 && isfinite(slope))
+            fprintf(to, ", %.9g * x**%.9g with lines lc %d title 'order %.2f'", at_one, slope, block + 1, slope);
+        block++;
+    }
     fputc('\n', to);
     fclose(to);
     return true;
@@ -122,8 +162,10 @@ static void map_tics(FILE *to, const study *s, char axis, const char *key) {
     }
 }
 
-static bool plot_map(const plot_files *files, const study *s, const study_plot *plot, const study_table *table, const char *x, const char *y) {
-    static const char *const colour[RUN_STATUS_COUNT] = {"#4daf4a", "#a6d96a", "#80cdc1", "#bdbdbd", "#fdae61", "#ffff66", "#d73027", "#000000", "#984ea3"};
+static bool plot_map(const plot_files *files, const study *s, const study_plot *plot, const study_table *table,
+                     const char *x, const char *y) {
+    static const char *const colour[RUN_STATUS_COUNT] = {"#4daf4a", "#a6d96a", "#80cdc1", "#bdbdbd", "#fdae61",
+                                                         "#ffff66", "#d73027", "#000000", "#984ea3"};
     FILE *data = fopen(files->data, "w");
     int found[RUN_STATUS_COUNT] = {0};
     if (!data)
@@ -151,8 +193,8 @@ static bool plot_map(const plot_files *files, const study *s, const study_plot *
     for (int k = 0; k < RUN_STATUS_COUNT; k++) {
         if (!found[k])
             continue;
-        fprintf(to, "%s'%s' index %d using 1:2:(0.45):(0.45) with boxxyerror lc '%s' title '%s'", any ? ", " : "", files->data, k, colour[k],
-                study_status_word[k]);
+        fprintf(to, "%s'%s' index %d using 1:2:(0.45):(0.45) with boxxyerror lc '%s' title '%s'", any ? ", " : "",
+                files->data, k, colour[k], study_status_word[k]);
         any = true;
     }
     fputc('\n', to);
@@ -191,40 +233,43 @@ static const char *first_check(const study_table *table, char name[128]) {
         for (int k = 0; k < table->row[i].n && !*name; k++) {
             const char *cell = table->row[i].cell[k].name;
             const size_t n = strlen(cell);
-            if (n > 6 && strcmp(cell + n - 6, "_error") == 0 && strcmp(cell, "volume_error") != 0 && strcmp(cell, "sediment_error") != 0)
+            if (n > 6 && strcmp(cell + n - 6, "_error") == 0 && strcmp(cell, "volume_error") != 0 &&
+                strcmp(cell, "sediment_error") != 0)
                 snprintf(name, 128, "%.*s", (int)(n - 6), cell);
         }
     return name;
 }
 
-static const char *plot_one(const study *s, const char *out, const study_table *table, const study_plot *plot, bool asked) {
+void study_axes(const study *s, const study_table *table, const study_plot *plot, const char **x, char **y) {
     char first[128];
-    const char *check = plot->check ? plot->check : first_check(table, first), *missing = NULL;
     const char *range[2] = {s->n_range > 0 ? s->range[0].key : s->seek.key, s->n_range > 1 ? s->range[1].key : NULL};
-    plot_files files = {silt_text("%s/%s.dat", out, plot->name), silt_text("%s/%s.gp", out, plot->name), silt_text("%s/%s.svg", out, plot->name)};
-    char *error = silt_text("%s_error", check);
-    bool made = false;
-    switch (plot->kind) {
-    case PLOT_TIME:
-        made = *check && plot_line(&files, s, plot, table, "cpu_seconds", error);
-        break;
-    case PLOT_ORDER:
-        made = *check && plot_line(&files, s, plot, table, plot->x ? plot->x : range[0], error);
-        break;
-    case PLOT_COST:
-        made = plot_line(&files, s, plot, table, plot->x ? plot->x : "nodes", "cpu_seconds");
-        break;
-    case PLOT_MAP:
-        made = (plot->x || range[0]) && (plot->y || range[1]) && plot_map(&files, s, plot, table, plot->x ? plot->x : range[0], plot->y ? plot->y : range[1]);
-        break;
-    }
+    const char *check = plot->check ? plot->check : first_check(table, first);
+    *x = plot->kind == PLOT_TIME ? "cpu_seconds" : plot->x ? plot->x : plot->kind == PLOT_COST ? "nodes" : range[0];
+    if (plot->kind == PLOT_MAP)
+        *y = plot->y || range[1] ? silt_text("%s", plot->y ? plot->y : range[1]) : NULL;
+    else if (plot->kind == PLOT_COST)
+        *y = silt_text("cpu_seconds");
+    else
+        *y = *check ? silt_text("%s_error", check) : NULL;
+}
+
+static const char *plot_one(const study *s, const char *out, const study_table *table, const study_plot *plot,
+                            bool asked) {
+    const char *x, *missing = NULL;
+    char *y;
+    plot_files files = {silt_text("%s/%s.dat", out, plot->name), silt_text("%s/%s.gp", out, plot->name),
+                        silt_text("%s/%s.svg", out, plot->name)};
+    study_axes(s, table, plot, &x, &y);
+    const bool made = y && (plot->kind == PLOT_TIME  ? plot_time(&files, s, plot, table, x, y)
+                            : plot->kind == PLOT_MAP ? plot_map(&files, s, plot, table, x, y)
+                                                     : plot_line(&files, s, plot, table, x, y));
     if (made) {
         char *log = silt_text("%s/gnuplot.log", out);
         missing = plot_draw(files.script, log);
         free(log);
     } else if (asked)
         missing = "there is nothing to draw";
-    free(error);
+    free(y);
     free(files.data);
     free(files.script);
     free(files.picture);
@@ -232,7 +277,10 @@ static const char *plot_one(const study *s, const char *out, const study_table *
 }
 
 silt_status study_plots(const study *s, const char *out, const study_table *table, FILE *to, silt_error *err) {
-    static const study_plot usual[] = {{PLOT_TIME, "time", 0, 0, 0}, {PLOT_ORDER, "order", 0, 0, 0}, {PLOT_COST, "cost", 0, 0, 0}, {PLOT_MAP, "map", 0, 0, 0}};
+    static const study_plot usual[] = {{.kind = PLOT_TIME, .name = "time"},
+                                       {.kind = PLOT_ORDER, .name = "order"},
+                                       {.kind = PLOT_COST, .name = "cost"},
+                                       {.kind = PLOT_MAP, .name = "map"}};
     const int n = s->n_plot ? s->n_plot : (int)(sizeof usual / sizeof *usual);
     (void)err;
     // gnuplot takes file names as they are: it works in the folder of the results

@@ -2,7 +2,9 @@
 #include "study.h"
 
 static double points_number(const study_range *r, int k, uint64_t *random) {
-    const double share = r->kind == RANGE_RANDOM || r->kind == RANGE_LOG_RANDOM ? silt_uniform(random) : r->count > 1 ? (double)k / (r->count - 1) : 0;
+    const double share = r->kind == RANGE_RANDOM || r->kind == RANGE_LOG_RANDOM ? silt_uniform(random)
+                         : r->count > 1                                         ? (double)k / (r->count - 1)
+                                                                                : 0;
     const bool log_scale = r->kind == RANGE_LOG || r->kind == RANGE_LOG_RANDOM;
     if (share == 0 || share == 1)
         return share == 0 ? r->low : r->high;
@@ -17,7 +19,8 @@ void study_points(study *s) {
         r->n_text = r->kind == RANGE_VALUES ? r->n_value : r->count;
         r->text = silt_alloc((size_t)r->n_text, sizeof *r->text);
         for (int k = 0; k < r->n_text; k++)
-            r->text[k] = r->kind == RANGE_VALUES ? silt_text("%s", r->value[k]) : silt_text("%.6g", points_number(r, k, &random));
+            r->text[k] = r->kind == RANGE_VALUES ? silt_text("%s", r->value[k])
+                                                 : silt_text("%.6g", points_number(r, k, &random));
     }
 }
 
@@ -53,13 +56,14 @@ static char *points_set(const char *key, const char *form, const char *value) {
     return text;
 }
 
-void study_assign(char ***set, int *n_set, int *capacity, const char *key, const char *form, int n_with, const study_with *with,
-                  const char *value) {
+void study_assign(char ***set, int *n_set, int *capacity, const char *key, const char *form, int n_with,
+                  const study_with *with, const char *value) {
     SILT_RESERVE(*set, *capacity, *n_set + 1 + n_with);
     (*set)[(*n_set)++] = points_set(key, form, value);
     for (int i = 0; i < n_with; i++) {
         double x;
-        char *scaled = with[i].factor != 1 && silt_text_number(value, &x) ? silt_text("%.12g", with[i].factor * x) : silt_text("%s", value);
+        char *scaled = with[i].factor != 1 && silt_text_number(value, &x) ? silt_text("%.12g", with[i].factor * x)
+                                                                          : silt_text("%s", value);
         (*set)[(*n_set)++] = points_set(with[i].key, with[i].form, scaled);
         free(scaled);
     }

@@ -6,7 +6,8 @@
 
 #define MOST_ROWS 60
 
-static const char *const report_mark[RUN_STATUS_COUNT] = {"ok", "cut", "warned", "refused", "**failed**", "**unfinished**", "**hung**", "**crashed**", "**wrong**"};
+static const char *const report_mark[RUN_STATUS_COUNT] = {
+    "ok", "cut", "warned", "refused", "**failed**", "**unfinished**", "**hung**", "**crashed**", "**wrong**"};
 
 static void report_cell(FILE *to, const char *text) {
     for (; text && *text; text++)
@@ -21,7 +22,8 @@ static void report_counts(FILE *to, const study_table *table, int wanted) {
     const char *between = "";
     for (int i = 0; i < table->n; i++) {
         const study_row *row = &table->row[i];
-        const double seconds = study_row_number(row, "cpu_seconds"), v = study_row_number(row, "volume_error"), e = study_row_number(row, "energy_excess");
+        const double seconds = study_row_number(row, "cpu_seconds"), v = study_row_number(row, "volume_error"),
+                     e = study_row_number(row, "energy_excess");
         count[study_row_status(row)]++;
         cpu += isnan(seconds) ? 0 : seconds;
         if (study_row_status(row) > RUN_WARNED)
@@ -54,7 +56,8 @@ static void report_counts(FILE *to, const study_table *table, int wanted) {
 static const char *map_mark(const study *s, const study_table *table, int a, int x, int b, int y) {
     int worst = -1;
     for (int i = 0; i < table->n; i++) {
-        const char *p = study_row_text(&table->row[i], s->range[a].key), *q = study_row_text(&table->row[i], s->range[b].key);
+        const char *p = study_row_text(&table->row[i], s->range[a].key),
+                   *q = study_row_text(&table->row[i], s->range[b].key);
         if (p && q && strcmp(p, s->range[a].text[x]) == 0 && strcmp(q, s->range[b].text[y]) == 0) {
             const int status = (int)study_row_status(&table->row[i]);
             worst = status > worst ? status : worst;
@@ -80,12 +83,15 @@ static void report_map(FILE *to, const study *s, const study_table *table, int a
 }
 
 static void report_rows(FILE *to, const study *s, const study_table *table) {
-    static const char *const column[] = {"status", "steps", "time", "volume_error", "mass_error", "energy_excess", "reason"};
+    static const char *const column[] = {"status",     "steps",         "time",  "volume_error",
+                                         "mass_error", "energy_excess", "reason"};
     fprintf(to, "\n|");
     for (int r = 0; r < s->n_range; r++)
         fprintf(to, " %s |", s->range[r].key);
-    fprintf(to, s->seek.on ? " %s | status | steps | time | volume error | mass error | energy excess | reason |\n|" :
-                            "%s status | steps | time | volume error | mass error | energy excess | reason |\n|", s->seek.on ? s->seek.key : "");
+    fprintf(to,
+            s->seek.on ? " %s | status | steps | time | volume error | mass error | energy excess | reason |\n|"
+                       : "%s status | steps | time | volume error | mass error | energy excess | reason |\n|",
+            s->seek.on ? s->seek.key : "");
     for (int k = 0; k < s->n_range + 7 + s->seek.on; k++)
         fprintf(to, "---|");
     fputc('\n', to);
@@ -135,7 +141,8 @@ static void report_reasons(FILE *to, const study_table *table) {
             continue;
         int n = 0;
         for (int k = i; k < table->n; k++)
-            if (!told[k] && study_row_status(&table->row[k]) == status && reason_same(reason_of(&table->row[i]), reason_of(&table->row[k]))) {
+            if (!told[k] && study_row_status(&table->row[k]) == status &&
+                reason_same(reason_of(&table->row[i]), reason_of(&table->row[k]))) {
                 told[k] = true;
                 n++;
             }
@@ -155,8 +162,9 @@ static void report_sought(FILE *to, const study *s, const char *out) {
             fprintf(to, "sought: ");
             for (int r = 0; r < s->n_range; r++)
                 fprintf(to, "%s %s, ", s->range[r].key, study_value(s, k, r));
-            fprintf(to, "%s = %s gives %s = %s (asked %s) after %s runs: %s\n", s->seek.key, study_row_text(&row, s->seek.key), s->seek.check,
-                    study_row_text(&row, s->seek.check), study_row_text(&row, "asked"), study_row_text(&row, "runs"), study_row_text(&row, "result"));
+            fprintf(to, "%s = %s gives %s = %s (asked %s) after %s runs: %s\n", s->seek.key,
+                    study_row_text(&row, s->seek.key), s->seek.check, study_row_text(&row, s->seek.check),
+                    study_row_text(&row, "asked"), study_row_text(&row, "runs"), study_row_text(&row, "result"));
         }
         study_row_clear(&row);
         free(path);
@@ -166,14 +174,18 @@ static void report_sought(FILE *to, const study *s, const char *out) {
 static void report_orders(FILE *to, const study *s, const study_table *table) {
     for (int i = 0; i < s->n_plot; i++) {
         const study_plot *plot = &s->plot[i];
-        if ((plot->kind != PLOT_ORDER || !plot->check) && plot->kind != PLOT_COST)
+        const char *x, *value;
+        char *y;
+        if (plot->kind != PLOT_ORDER && plot->kind != PLOT_COST)
             continue;
-        const char *x = plot->x ? plot->x : plot->kind == PLOT_COST ? "nodes" : s->n_range ? s->range[0].key : s->seek.key;
-        char *y = plot->kind == PLOT_COST ? silt_text("cpu_seconds") : silt_text("%s_error", plot->check);
-        double slope, at_one;
-        const int n = study_slope(table, x, y, &slope, &at_one);
-        if (n > 1 && isfinite(slope))
-            fprintf(to, "%s: %s goes with %s to the power %.2f (%d runs)\n", plot->name, y, x, slope, n);
+        study_axes(s, table, plot, &x, &y);
+        for (int k = 0; y && (value = study_distinct(table, plot->by, k)); k++) {
+            double slope, at_one;
+            const int n = study_slope(table, x, y, plot->by, value, &slope, &at_one);
+            if (n > 1 && isfinite(slope))
+                fprintf(to, "%s: %s goes with %s to the power %.2f (%d runs%s%s%s%s)\n", plot->name, y, x, slope, n,
+                        plot->by ? ", " : "", plot->by ? plot->by : "", plot->by ? " = " : "", value);
+        }
         free(y);
     }
 }

@@ -1,4 +1,5 @@
-// what a run left, held against what a run must keep: numbers that are finite, volume, sediment, energy; then its status and reason
+// what a run left, held against what a run must keep: numbers that are finite, volume, sediment, energy; then its
+// status and reason
 #include <libfyaml.h>
 #include <sys/stat.h>
 
@@ -18,13 +19,15 @@ typedef struct result_history {
 
 // energies that the history can add up: of what moves, less what came from outside
 typedef struct result_energy {
-    bool water, grains;  // counted
-    bool worked;         // external_work is all that came from outside
-    int column[6];       // kinetic, potential, owed, external_work, grain_kinetic, grain_potential
+    bool water, grains; // counted
+    bool worked;        // external_work is all that came from outside
+    int column[6];      // kinetic, potential, owed, external_work, grain_kinetic, grain_potential
 } result_energy;
 
 // number of a row in a column, 0 where the scene has no such column
-static double result_cell(const char *row, int column) { return column < 0 ? 0 : silt_history_number(row, column); }
+static double result_cell(const char *row, int column) {
+    return column < 0 ? 0 : silt_history_number(row, column);
+}
 
 static bool walls_rest(const silt_scene *scene) {
     for (int i = 0; i < scene->n_wall; i++)
@@ -33,23 +36,30 @@ static bool walls_rest(const silt_scene *scene) {
     return true;
 }
 
-// Openings, a bed, forces, tension and closed air hold or bring energy that the history does not tell: no sum then. Of water and grains
-// together the sum is known where nothing is driven from outside, of water beside them and beside bodies through the work done on it.
+// Openings, a bed, bodies, forces, tension and closed air hold or bring energy that the history does not tell: no sum
+// then. Of water and grains together the sum is known where nothing is driven from outside, of water beside walls that
+// move through the work done on it.
 static result_energy energy_known(const silt_scene *scene) {
     const silt_fluid_def *fluid = &scene->fluid;
     result_energy known = {0};
-    const bool closed = fluid->n_inlet == 0 && fluid->n_outlet == 0 && !scene->bed.on && fluid->force.kind == 0 && fluid->surface_tension == 0 &&
-                        fluid->air_pressure == 0 && scene->period[0] == scene->period[1];
+    const bool closed = fluid->n_inlet == 0 && fluid->n_outlet == 0 && !scene->bed.on && fluid->force.kind == 0 &&
+                        fluid->surface_tension == 0 && fluid->air_pressure == 0 && scene->period[0] == scene->period[1];
     if (!closed)
         return known;
     const bool alone = walls_rest(scene) && scene->n_body == 0;
+    // of bodies that hit water the history has no energy
+    for (int i = 0; i < scene->n_body; i++)
+        if (scene->body[i].motion == MOTION_FREE)
+            return known;
     known.water = fluid->on;
     known.grains = scene->grains.on && alone;
     known.worked = fluid->on && !known.grains;
     return known;
 }
 
-static bool energy_counts(const result_energy *known, int i) { return i < 3 ? known->water : i == 3 ? known->worked : known->grains; }
+static bool energy_counts(const result_energy *known, int i) {
+    return i < 3 ? known->water : i == 3 ? known->worked : known->grains;
+}
 
 static double energy_sum(const result_energy *known, const char *row) {
     double sum = 0;
@@ -95,7 +105,8 @@ static void row_finite(const bool *finite, int n, const char *header, const char
 }
 
 static void history_read(const silt_scene *scene, const char *out, result_history *h) {
-    static const char *const name[] = {"kinetic_energy", "potential_energy", "owed_energy", "external_work", "grain_kinetic_energy", "grain_potential_energy"};
+    static const char *const name[] = {"kinetic_energy", "potential_energy",     "owed_energy",
+                                       "external_work",  "grain_kinetic_energy", "grain_potential_energy"};
     char *path = silt_text("%s/history.csv", out), *line = NULL, *header = NULL;
     size_t capacity = 0, room = 0;
     int n = 0;
@@ -156,14 +167,16 @@ static double still_energy(const silt_scene *scene) {
     for (int i = 0; i < scene->fluid.n_region; i++) {
         double lo[3] = {0}, hi[3] = {0};
         silt_region_bounds(&scene->fluid.region[i], lo, hi);
-        energy += 0.5 * scene->fluid.density * g * silt_region_area(&scene->fluid.region[i]) * (hi[up < n ? up : 1] - lo[up < n ? up : 1]);
+        energy += 0.5 * scene->fluid.density * g * silt_region_area(&scene->fluid.region[i]) *
+                  (hi[up < n ? up : 1] - lo[up < n ? up : 1]);
     }
     return energy;
 }
 
 // a number of the last frame that is none; @return false: all are
 static bool frame_bad(const char *out, char text[64]) {
-    static const char *const part[] = {"fluid", "grains"}, *const array[] = {"PointData/velocity", "PointData/pressure"};
+    static const char *const part[] = {"fluid", "grains"}, *const array[] = {"PointData/velocity",
+                                                                             "PointData/pressure"};
     silt_frame_entry *entry = NULL;
     const int n = silt_frame_index(out, &entry);
     bool bad = false;
@@ -186,8 +199,8 @@ static bool frame_bad(const char *out, char text[64]) {
 
 // ---------------------------------------------------------------- reasons
 
-// first line of the message of a run that ended with one, or its first warning
-static void log_reason(const char *log, bool warning, char *reason, size_t size) {
+// first line of the message of a run that ended with one
+static void log_reason(const char *log, char *reason, size_t size) {
     char *line = NULL;
     size_t capacity = 0;
     ssize_t length;
@@ -196,7 +209,7 @@ static void log_reason(const char *log, bool warning, char *reason, size_t size)
     while (from && (length = getline(&line, &capacity, from)) > 0) {
         line[strcspn(line, "\n")] = 0;
         const bool warns = strncmp(line, "warning", 7) == 0 || strstr(line, ": warning: ");
-        if (warns != warning || !*line)
+        if (warns || !*line)
             continue;
         snprintf(reason, size, "%s", line);
         break;
@@ -206,18 +219,38 @@ static void log_reason(const char *log, bool warning, char *reason, size_t size)
     free(line);
 }
 
+// what a run warned of while it went, a line each
+static void log_warnings(const char *out, char *text, size_t size) {
+    char *path = silt_text("%s/run.log", out), *line = NULL;
+    size_t capacity = 0, used = 0;
+    FILE *from = fopen(path, "r");
+    *text = 0;
+    while (from && getline(&line, &capacity, from) > 0 && used < size - 1)
+        if (strncmp(line, "warning", 7) == 0) {
+            snprintf(text + used, size - used, "%s", line);
+            used = strlen(text);
+        }
+    if (from)
+        fclose(from);
+    free(line);
+    free(path);
+}
+
 static double result_number(struct fy_document *summary, const char *key) {
     return strcmp(silt_summary_text(summary, key), "null") == 0 ? NAN : silt_summary_number(summary, key);
 }
 
 // @return true: the run is wrong, and text says in what; whole: it went to its end
-static bool judge(const study *s, const silt_scene *scene, const char *out, struct fy_document *summary, bool whole, const char *warned,
-                  study_row *row, char *text, size_t size) {
+static bool judge(const study *s, const silt_scene *scene, const char *out, struct fy_document *summary, bool whole,
+                  const char *warned, study_row *row, char *text, size_t size) {
     result_history h;
     char where[64] = "";
     history_read(scene, out, &h);
-    const double volume = result_number(summary, "/worst_volume_error"), sediment = result_number(summary, "/worst_sediment_error");
-    const double scale = h.scale + (scene->fluid.on ? still_energy(scene) : 0), excess = scale > 0 ? h.excess / scale : h.excess > 0 ? HUGE_VAL : h.excess;
+    const double volume = result_number(summary, "/worst_volume_error"),
+                 sediment = result_number(summary, "/worst_sediment_error");
+    const double scale = h.scale + (scene->fluid.on ? still_energy(scene) : 0), excess = scale > 0 ? h.excess / scale
+                                                                                         : h.excess > 0 ? HUGE_VAL
+                                                                                                        : h.excess;
     study_row_add(row, "volume_error", "%.3g", volume);
     study_row_add(row, "mass_error", "%.3g", h.mass);
     study_row_add(row, "sediment_error", "%.3g", sediment);
@@ -228,14 +261,15 @@ static bool judge(const study *s, const silt_scene *scene, const char *out, stru
         snprintf(text, size, "no number in %s", where);
     else if (!whole)
         return false;
-    else if (!(h.mass <= s->bounds.mass) && !strstr(warned, "volume"))
+    else if (!(h.mass <= s->bounds.mass) && !strstr(warned, "water's volume is off"))
         snprintf(text, size, "mass error %.3g, allowed %g", h.mass, s->bounds.mass);
-    else if (!(fabs(volume) <= s->bounds.volume) && !strstr(warned, "volume"))
+    else if (!(fabs(volume) <= s->bounds.volume) && !strstr(warned, "water's volume is off"))
         snprintf(text, size, "volume error %.3g, allowed %g", volume, s->bounds.volume);
     else if (!(fabs(sediment) <= s->bounds.sediment))
         snprintf(text, size, "sediment error %.3g, allowed %g", sediment, s->bounds.sediment);
-    else if (excess > s->bounds.energy && !strstr(warned, "smaller fluid.size"))
-        snprintf(text, size, "energy %.3g above the start and the work from outside, allowed %g", excess, s->bounds.energy);
+    else if (excess > s->bounds.energy && !*warned)
+        snprintf(text, size, "energy %.3g above the start and the work from outside, allowed %g", excess,
+                 s->bounds.energy);
     else
         return false;
     return true;
@@ -243,7 +277,8 @@ static bool judge(const study *s, const silt_scene *scene, const char *out, stru
 
 static void result_numbers(struct fy_document *summary, study_row *row) {
     const double steps = silt_summary_number(summary, "/steps_here"), time = silt_summary_number(summary, "/time");
-    const double nodes = steps > 0 ? silt_summary_number(summary, "/node_steps") / steps : silt_summary_number(summary, "/nodes");
+    const double nodes =
+        steps > 0 ? silt_summary_number(summary, "/node_steps") / steps : silt_summary_number(summary, "/nodes");
     const double retries = silt_summary_number(summary, "/retries");
     study_row_add(row, "nodes", "%.6g", nodes);
     study_row_add(row, "grains", "%s", silt_summary_text(summary, "/grains"));
@@ -275,20 +310,22 @@ static void result_checks(struct fy_document *summary, study_row *row) {
 void study_result(const study *s, const char *out, const char *log, const study_end *end, study_row *row) {
     struct fy_document *summary = end->code >= 0 ? silt_summary_open(out) : NULL;
     study_status status = RUN_OK;
-    char reason[400] = "", why[200], warned[400], *told = silt_text("%s/run.log", out);
+    char reason[400] = "", why[200], warned[2000];
     study_row numbers = {0};
-    log_reason(log, false, reason, sizeof reason);
-    log_reason(told, true, warned, sizeof warned);
-    free(told);
+    log_reason(log, reason, sizeof reason);
+    log_warnings(out, warned, sizeof warned);
     if (end->late) {
         status = end->stalled ? RUN_HUNG : RUN_UNFINISHED;
-        snprintf(reason, sizeof reason, "stopped after %.3g s of the processor, %.3g s on the wall", end->cpu, end->wall);
+        snprintf(reason, sizeof reason, "stopped after %.3g s of the processor, %.3g s on the wall", end->cpu,
+                 end->wall);
     } else if (end->signal) {
         status = RUN_CRASHED;
         snprintf(why, sizeof why, "%.150s", reason);
         snprintf(reason, sizeof reason, "ended by signal %d%s%s", end->signal, *why ? ": " : "", why);
     } else if (end->code == SILT_INPUT)
         status = RUN_REFUSED;
+    else if (end->code == SILT_STOPPED)
+        status = RUN_UNFINISHED; // by time.wall, or a signal
     else if ((end->code == SILT_FAILED && !*reason) || (end->code != SILT_OK && end->code != SILT_FAILED) || !summary) {
         status = RUN_CRASHED;
         snprintf(reason, sizeof reason, end->code ? "exit code %d without a word" : "no summary.json", end->code);
@@ -300,10 +337,11 @@ void study_result(const study *s, const char *out, const char *log, const study_
         char *path = silt_text("%s/scene.yaml", out);
         status = !whole ? RUN_FAILED : *warned ? RUN_WARNED : cut > 0 ? RUN_CUT : RUN_OK;
         if (whole && *warned)
-            snprintf(reason, sizeof reason, "%s", warned);
+            snprintf(reason, sizeof reason, "%.*s", (int)strcspn(warned, "\n"), warned);
         else if (whole)
             snprintf(reason, sizeof reason, cut > 0 ? "%.0f steps cut" : "", cut);
-        if (silt_scene_read(path, 0, NULL, &scene, &err) != SILT_OK || judge(s, scene, out, summary, whole, warned, &numbers, why, sizeof why)) {
+        if (silt_scene_read(path, 0, NULL, &scene, &err) != SILT_OK ||
+            judge(s, scene, out, summary, whole, warned, &numbers, why, sizeof why)) {
             status = RUN_WRONG;
             snprintf(reason, sizeof reason, "%s", scene ? why : "scene.yaml of the run cannot be read");
         }

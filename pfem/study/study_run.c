@@ -12,9 +12,10 @@
 #include "run.h"
 #include "study.h"
 
-#define WALL_FACTOR 20.0 // the limit on the wall's clock in that of the processor: a busy machine is no fault of the run
-#define WALL_LEAST 60.0  // s more
-#define LOOK_EVERY 20    // ms
+#define WALL_FACTOR                                                                                                    \
+    20.0                // the limit on the wall's clock in that of the processor: a busy machine is no fault of the run
+#define WALL_LEAST 60.0 // s more
+#define LOOK_EVERY 20   // ms
 
 // ---------------------------------------------------------------- the child
 
@@ -98,7 +99,8 @@ static double child_idle(const char *history, double wall) {
     return silt_clamp((double)(now.tv_sec - file.st_mtim.tv_sec), 0, wall);
 }
 
-static silt_status child_run(const study *s, const char *out, const char *log, char *const *word, study_end *end, silt_error *err) {
+static silt_status child_run(const study *s, const char *out, const char *log, char *const *word, study_end *end,
+                             silt_error *err) {
     const double began = silt_seconds();
     *end = (study_end){0};
     const pid_t child = fork();
@@ -126,14 +128,16 @@ static silt_status child_run(const study *s, const char *out, const char *log, c
     end->wall = silt_seconds() - began;
     end->code = WIFEXITED(code) ? WEXITSTATUS(code) : -1;
     end->signal = WIFSIGNALED(code) ? WTERMSIG(code) : 0;
-    end->cpu = (double)(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) + 1e-6 * (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+    end->cpu = (double)(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+               1e-6 * (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
     end->memory = 1024.0 * (double)usage.ru_maxrss;
     return SILT_OK;
 }
 
 // ---------------------------------------------------------------- one run
 
-// what the run hangs on: the scene as it is read with these replacements, or what is wrong with it, and how it is judged
+// what the run hangs on: the scene as it is read with these replacements, or what is wrong with it, and how it is
+// judged
 static uint64_t run_hash(const study *s, int n_set, char *const *set) {
     silt_scene *scene = NULL;
     silt_error err = {0};
@@ -143,12 +147,13 @@ static uint64_t run_hash(const study *s, int n_set, char *const *set) {
     else
         hash = silt_hash(0, err.text, strlen(err.text));
     silt_scene_free(&scene);
-    const double judged[] = {s->limit, s->memory, s->threads, s->bounds.volume, s->bounds.mass, s->bounds.sediment, s->bounds.energy};
+    const double judged[] = {s->limit,       s->memory,          s->threads,      s->bounds.volume,
+                             s->bounds.mass, s->bounds.sediment, s->bounds.energy};
     return silt_hash(hash, judged, sizeof judged);
 }
 
-silt_status study_run(const study *s, const silt_study_def *def, const char *out, const char *name, int n_set, char *const *set,
-                      const study_row *head, study_row *row, silt_error *err) {
+silt_status study_run(const study *s, const silt_study_def *def, const char *out, const char *name, int n_set,
+                      char *const *set, const study_row *head, study_row *row, silt_error *err) {
     char *file = silt_text("%s/runs/%s.row", out, name), *folder = silt_text("%s/runs/%s.out", out, name);
     char *log = silt_text("%s/runs/%s.log", out, name), hash[32];
     silt_status status = SILT_OK;
@@ -204,14 +209,15 @@ static char **job_set(const study *s, int k, const char *value, int *n_set) {
     for (int i = 0; i < s->n_set; i++)
         set[(*n_set)++] = silt_text("%s", s->set[i]);
     for (int r = 0; r < s->n_range; r++)
-        study_assign(&set, n_set, &capacity, s->range[r].key, s->range[r].form, s->range[r].n_with, s->range[r].with, study_value(s, k, r));
+        study_assign(&set, n_set, &capacity, s->range[r].key, s->range[r].form, s->range[r].n_with, s->range[r].with,
+                     study_value(s, k, r));
     if (value)
         study_assign(&set, n_set, &capacity, s->seek.key, s->seek.form, s->seek.n_with, s->seek.with, value);
     return set;
 }
 
-static silt_status job_run(const study *s, const silt_study_def *def, const char *out, int k, const char *value, const char *name, study_row *row,
-                           silt_error *err) {
+static silt_status job_run(const study *s, const silt_study_def *def, const char *out, int k, const char *value,
+                           const char *name, study_row *row, silt_error *err) {
     int n_set;
     char **set = job_set(s, k, value, &n_set);
     study_row head = {0};
@@ -280,7 +286,8 @@ static silt_status job_search_run(job_search *search, silt_error *err) {
     }
     if ((above[0] > 0) == (above[1] > 0)) {
         const int near = fabs(above[1]) < fabs(above[0]);
-        return search_tell(search, x[near], above[near], "both ends of the range are on the same side of the value", err);
+        return search_tell(search, x[near], above[near], "both ends of the range are on the same side of the value",
+                           err);
     }
     double middle = NAN, here = NAN;
     while (search->n_run < seek->runs) {
