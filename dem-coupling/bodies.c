@@ -5,14 +5,13 @@ static const double clump_spacing = 0.3; // between the spheres of an outline, t
 static const double clump_finer = 0.7;   // from one radius to the next when a clump has to follow its outline more closely
 static const double skin_slack = 0.05;   // times h: how far behind a wall a surface may stand that stands for a round one
 
-// m, wanted distance between the water's nodes on a body: fluid.size, or what fluid.sizes say for bodies and for where it is
-static double body_size(const silt_scene *scene, const silt_body_def *def, double radius) {
+double silt_coupling_body_size(const silt_scene *scene, const silt_body_def *def, double radius) {
     double h = scene->fluid.size;
     if (!scene->fluid.on)
         return radius / 6.0;
     for (int k = 0; k < scene->fluid.n_size; k++) {
         const silt_size_def *size = &scene->fluid.size_at[k];
-        if (size->near == NEAR_BODIES || (size->near == NEAR_REGION && silt_region_distance(&size->region, 3, def->at) < 0.0))
+        if (size->near == NEAR_BODIES || (size->near == NEAR_REGION && silt_region_distance(&size->region, scene->dimension == 3 ? 3 : 2, def->at) < 0.0))
             h = silt_min(h, size->size);
     }
     return h;
@@ -44,7 +43,7 @@ static silt_status body_space(const silt_scene *scene, coupling_body *body, stru
                               silt_error *err) {
     char what[96];
     SILT_TRY(silt_form_create(&body->form, def, err));
-    const double h = body_size(scene, def, body->form.radius), thickness = silt_form_thickness(&body->form);
+    const double h = silt_coupling_body_size(scene, def, body->form.radius), thickness = silt_form_thickness(&body->form);
     if (scene->fluid.on && thickness < h)
         return silt_fail(err, SILT_INPUT, "body %s: scale: found parts only %g m thick, allowed at least the water's size there, %g m: make it thicker or the mesh finer",
                          def->name, thickness, h);

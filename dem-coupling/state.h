@@ -172,6 +172,8 @@ silt_status silt_coupling_bodies(silt_coupling *coupling, silt_error *err);
 void silt_coupling_orientation(const silt_body_def *def, double angle, double q[4]);
 silt_status silt_coupling_describe(const silt_scene *scene, FILE *to, silt_error *err);
 void silt_coupling_bodies_clear(silt_coupling *coupling);
+/** m, wanted distance between the water's nodes on a body, fluid.size or what fluid.sizes say there; radius: of the body */
+double silt_coupling_body_size(const silt_scene *scene, const silt_body_def *def, double radius);
 /** tells the discrete elements of them */
 silt_status silt_coupling_send_bodies(silt_coupling *coupling, silt_error *err);
 /** distance from a point to body i; beyond `far` only a lower bound of it */

@@ -6,6 +6,7 @@
 #define FLUID_SLOW 12        // passes after which stiff cells, few as they are, bring that too
 #define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
 #define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
+#define FLUID_AGAIN 10      // iterations of a step that is solved again, at least: to cut it now costs LIGGGHTS' step too
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 #define FLUID_INNER 1e4     // accuracy of a pressure increment over that of the step, at least: refreshes are counted, so what an
@@ -516,7 +517,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, b
     silt_mix_restart(&f->mix);
     for (int i = 0; i < f->n_node && first; i++)
         first = p[i] == 0;
-    const int most = def->iterations * (first ? 10 : 1);
+    const int most = again ? silt_max(def->iterations, FLUID_AGAIN) : def->iterations * (first ? 10 : 1);
     for (f->iterations = 0;; f->iterations++) {
         silt_status status;
         if (s->drag && s->drag->update)

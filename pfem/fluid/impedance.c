@@ -4,13 +4,15 @@
 #define MODE_PASSES 4     // the second also takes the excess of the mass; more where viscosity is stiff
 #define MODE_ENOUGH 1e-4  // of the first divergence
 #define MODE_DROP   1e-6  // of the residual of a velocity
+#define MODE_STIFF  1e-3  // mu theta dt/(rho h^2) below which viscosity has no part in it
 #define MODE_PLANE  1e-6  // of a pressure increment
 #define MODE_SPACE  1e-3
 
 // velocity of the free components from the force on the nodes, held components in place
 static silt_status mode_velocity(silt_fluid *f, const silt_step *s, const double *force, double *w, silt_error *err) {
     const int D = f->dim;
-    if (f->mu_max > 0 && s->scene->fluid.scheme == SCHEME_IMPLICIT) {
+    const double stiff = f->mu_max * f->theta * s->dt / (s->scene->fluid.density * silt_square(s->scene->fluid.size));
+    if (stiff > MODE_STIFF && s->scene->fluid.scheme == SCHEME_IMPLICIT) {
         bool solved;
         silt_status status;
         SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, w));

@@ -2,6 +2,8 @@
 // elements, which move the bodies under contacts with it; then it takes the motion that came of that (docs/method.md, "Bodies").
 #include "run.h"
 
+#define BODY_THROWN 10 // cells that a body may be thrown over in a step that cannot be cut any more
+#define BODY_MOST 0.5  // of them, that it then moves
 #define ROW 6 // numbers of a body: force and torque, or velocity and angular velocity
 
 // rigid modes of a dimension
@@ -338,20 +340,24 @@ static void impedance_weight(const silt_run *run, const silt_impedance *z, doubl
     }
 }
 
-// a free body that would be carried over a cell from rest in the step, or turned as far: the water's step has failed. LIGGGHTS
-// would lose the body without a word.
-static silt_status impedance_sane(const silt_run *run, const silt_impedance *z, const double *force, const double *acceleration,
-                                  silt_error *err) {
+// A free body that would be carried over a cell from rest in the step, or turned as far: the water's step has failed. LIGGGHTS
+// would lose the body without a word. Where no smaller step will follow the body takes what half a cell needs, and is owed the rest.
+static silt_status impedance_sane(const silt_run *run, const silt_impedance *z, const double *force, double *acceleration, silt_error *err) {
     const silt_scene *scene = run->scene;
     const int D = silt_nodes_dim(&run->nodes);
     for (int k = 0; k < z->n; k++) {
         const struct silt_body *body = &run->body_before[z->body[k]];
-        const double *a = acceleration + ROW * k, *f = force + ROW * k;
+        double *a = acceleration + ROW * k;
+        const double *f = force + ROW * k;
         double reach = 0;
         for (int p = 0; p < body->n_point; p++)
             reach = silt_max(reach, silt_length(D, body->point + D * p));
         const double way = silt_square(run->dt) * (silt_length(3, a) + silt_length(3, a + 3) * reach);
-        if (!(way < scene->fluid.size))
+        const double most = scene->fluid.size;
+        if (run->fluid.last_try && way >= most && way < BODY_THROWN * most)
+            for (int d = 0; d < ROW; d++)
+                a[d] *= BODY_MOST * most / way;
+        else if (!(way < most))
             return silt_fail(err, SILT_FAILED, "the water's force (%.3g, %.3g, %.3g) N and torque (%.3g, %.3g, %.3g) N m would throw body '%s' at (%g, %g) over %.2g cells in a step",
                              f[0], f[1], f[2], f[3], f[4], f[5], scene->body[z->body[k]].name, body->x[0], body->x[1], way / scene->fluid.size);
     }

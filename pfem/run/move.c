@@ -329,6 +329,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     // material motion; all nodes, so that the old cells hold what continuity gave them
     const double before = silt_mesh_volume(mesh, nodes->x);
     let_go(run);
+    silt_uplift_open(run->uplift, run);
     for (int i = 0; i < n; i++)
         if (mesh->wet[i])
             for (int k = D * i; k < D * (i + 1); k++)

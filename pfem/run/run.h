@@ -152,12 +152,14 @@ silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_erro
 silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_error *err);
 
 // uplift.c --------------------------------------------------------------------------------------------
-/** Where bodies have nothing of the water's mesh on them, but no air either; of the present mesh. Makes *uplift at first. */
+/** Where bodies have nothing of the water's mesh on them, but no air either; of the present mesh. Makes *uplift at first. Nodes at
+ * mouths that are shut are no free surface any more, until silt_uplift_open. */
 void silt_uplift_find(silt_uplift **uplift, silt_run *run);
 /** out, 6 numbers a body: += factor times force and torque of the pressure there, from p of the nodes around */
 void silt_uplift_force(const silt_uplift *uplift, const silt_run *run, const double *p, double factor, double *out);
 /** out, 2 per node: the pressure there on the water's nodes at its mouths. @return false: there are none */
 bool silt_uplift_mouths(const silt_uplift *uplift, const silt_run *run, double *out);
+void silt_uplift_open(const silt_uplift *uplift, silt_run *run); // the step is over
 void silt_uplift_free(silt_uplift **uplift);
 
 // ledger.c --------------------------------------------------------------------------------------------

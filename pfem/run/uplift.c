@@ -2,6 +2,7 @@
 // same. Its pressure is that of the rim, linear along the outline from one end to the other; nought at an end that lies in air.
 #include "run.h"
 
+#define UPLIFT_SHUT 0.02 // of fluid.size: a gap whose mouth is narrower lets nothing through
 #define UPLIFT_GAP 0.5 // of fluid.size: what is nearer to something solid has no air between
 
 /** a stretch of the outline without cells: nodes in order, the first and the last of them are its rim */
@@ -12,7 +13,7 @@ typedef struct silt_gap {
 
 struct silt_uplift {
     int n_rim, rim_capacity;
-    int (*rim)[2];   // owned, facets of the water at the rims that are none of the body: the body's node, the facet
+    int (*rim)[3];   // owned, facets of the water at the rims that are none of the body: the body's node, the facet, 1: it is shut
     int n_node, n_gap, node_capacity, gap_capacity, ring_capacity, place_capacity, shut_capacity;
     int *node;       // owned
     silt_gap *gap;   // owned
@@ -128,7 +129,8 @@ static void rims_find(silt_uplift *u, const silt_run *run) {
                 continue;
             SILT_RESERVE(u->rim, u->rim_capacity, u->n_rim + 1);
             u->rim[u->n_rim][0] = i;
-            u->rim[u->n_rim++][1] = f;
+            u->rim[u->n_rim][1] = f;
+            u->rim[u->n_rim++][2] = near_solid(run, nodes->owner[i], nodes->x + 2 * i, UPLIFT_SHUT * run->scene->fluid.size);
         }
 }
 
@@ -136,14 +138,21 @@ static void rims_find(silt_uplift *u, const silt_run *run) {
 static void rims_close(const silt_uplift *u, silt_run *run) {
     silt_mesh *mesh = &run->mesh;
     for (int k = 0; k < u->n_rim; k++)
-        for (int c = 0; c < 2; c++)
+        for (int c = 0; c < 2 && u->rim[k][2]; c++)
             mesh->surface[mesh->facet[u->rim[k][1]][c]] = 0;
     for (int f = 0, k = 0; f < mesh->n_facet && u->n_rim; f++) {
-        for (k = 0; k < u->n_rim && u->rim[k][1] != f;)
+        for (k = 0; k < u->n_rim && (u->rim[k][1] != f || !u->rim[k][2]);)
             k++;
         for (int c = 0; c < 2 && mesh->facet_kind[f] == FACET_FREE && k == u->n_rim; c++)
             mesh->surface[mesh->facet[f][c]] = 1;
     }
+}
+
+void silt_uplift_open(const silt_uplift *u, silt_run *run) {
+    silt_mesh *mesh = &run->mesh;
+    for (int k = 0; u && k < u->n_rim; k++)
+        for (int c = 0; c < 2 && mesh->facet_kind[u->rim[k][1]] == FACET_FREE; c++)
+            mesh->surface[mesh->facet[u->rim[k][1]][c]] = 1;
 }
 
 void silt_uplift_find(silt_uplift **uplift, silt_run *run) {
@@ -184,7 +193,7 @@ bool silt_uplift_mouths(const silt_uplift *u, const silt_run *run, double *out) 
     memset(out, 0, (size_t)(2 * run->nodes.count) * sizeof *out);
     for (int k = 0; k < u->n_rim; k++) {
         const int i = u->rim[k][0], *facet = run->mesh.facet[u->rim[k][1]], j = facet[facet[0] == i];
-        if (run->nodes.kind[j] == NODE_BODY)
+        if (run->nodes.kind[j] == NODE_BODY || !u->rim[k][2])
             continue;
         const double share = (p[i] + 2 * p[j]) / 6;
         out[2 * j] -= share * (x[2 * facet[1] + 1] - x[2 * facet[0] + 1]);
