@@ -105,7 +105,7 @@ awk -v before="$work/before" -v behind="$work/behind" '
     { print }' "$page" >"$work/eyes.html"
 
 browse() {
-    timeout 120 chromium --headless=new --no-sandbox --disable-dev-shm-usage --user-data-dir="$work/chromium" --use-angle=swiftshader \
+    timeout 300 chromium --headless=new --no-sandbox --disable-dev-shm-usage --user-data-dir="$work/chromium" --use-angle=swiftshader \
         --enable-unsafe-swiftshader --hide-scrollbars --window-size=1200,2400 --virtual-time-budget=4000 "$@" 2>"$work/chromium.err"
 }
 browse --dump-dom "file://$work/eyes.html" >"$work/dom.html" || fail "chromium ended with $?: $(tail -n 3 "$work/chromium.err")"

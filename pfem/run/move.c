@@ -1,28 +1,11 @@
 // nodes to their new places: water with its velocity, drops in free flight, inlets back to their line, bodies with theirs
 #include "run.h"
 
-// a body on a path has the velocity and spin that carry it to its place at the end of the step
-static void bodies_ahead(const silt_run *run, silt_body_state *bodies) {
-    for (int b = 0; b < bodies->count; b++) {
-        const silt_body_def *def = &run->scene->body[b];
-        double from[4], to[4];
-        if (def->motion != MOTION_PRESCRIBED || !(run->dt > 0))
-            continue;
-        silt_path_at(&def->path, run->time, from);
-        silt_path_at(&def->path, run->time + run->dt, to);
-        for (int d = 0; d < 3; d++)
-            bodies->body[b].v[d] = (to[d] - from[d]) / run->dt;
-        bodies->body[b].w[2] = (to[3] - from[3]) / run->dt;
-    }
-}
-
 void silt_run_prescribe(silt_run *run) {
     const silt_scene *scene = run->scene;
     silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
-    silt_body_state *bodies = run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
-    if (bodies)
-        bodies_ahead(run, bodies);
+    const silt_body_state *bodies = run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
     for (int i = 0; i < nodes->count; i++) {
         double *v = nodes->v + D * i;
         if (nodes->kind[i] == NODE_INLET) {

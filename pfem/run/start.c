@@ -184,6 +184,18 @@ static silt_status water_there(const silt_run *run, silt_error *err) {
     return SILT_OK;
 }
 
+// m, the least of width, length and height of the water
+static double water_extent(const silt_run *run) {
+    const int D = silt_nodes_dim(&run->nodes);
+    double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, least = HUGE_VAL;
+    for (int i = 0; i < run->nodes.count; i++)
+        if (run->mesh.wet[i])
+            box_span(lo, hi, run->nodes.x + D * i, D, 0);
+    for (int d = 0; d < D; d++)
+        least = silt_min(least, hi[d] - lo[d]);
+    return run->mesh.n_cell > 0 ? least : HUGE_VAL;
+}
+
 // grains are points to the water, which takes their volume by a kernel some diameters wide
 static void grains_small(const silt_run *run) {
     const silt_scene *scene = run->scene;
@@ -194,6 +206,11 @@ static void grains_small(const silt_run *run) {
     if (largest > GRAIN_CELLS * scene->fluid.size * (1 + 1e-9))
         silt_run_warn(run, "a grain of %.3g m in water with cells of %.3g m: grains are points to the water, right up to %g cells; larger ones are bodies", largest,
                       scene->fluid.size, GRAIN_CELLS);
+    // a kernel that is wider than the water spreads the grain's volume all over it: what sinks lifts nothing
+    const double width = scene->grains.kernel > 0 ? scene->grains.kernel : silt_max(3 * largest, 2 * scene->fluid.size);
+    const double room = largest > 0 ? water_extent(run) : HUGE_VAL;
+    if (width > room)
+        silt_run_warn(run, "the kernel of the grains' volume is %.3g m wide, the water %.3g m: smaller grains, or grains.kernel", width, room);
 }
 
 silt_status silt_run_first(silt_run *run, silt_error *err) {
