@@ -90,7 +90,8 @@ struct silt_run {
     struct silt_body *body_before; // owned, poses at the start of the step
     int body_after_capacity, body_velocity_capacity, body_shift_capacity, body_carry_capacity;
     struct silt_body *body_after;  // owned, poses at its end, as far as they are known
-    double *body_velocity, *body_shift, *gap_force; // owned, dim per node, see silt_step
+    double *body_velocity, *body_shift, *gap_force, *body_start; // owned, dim per node, see silt_step
+    int body_start_capacity;
     int gap_force_capacity;
     bool gaps;                     // there are any
     double (*body_carry)[6];       // owned, N s and N m s per m: what the water gave bodies and they have not received yet
