@@ -445,6 +445,7 @@ void silt_run_free(silt_run *run) {
     free(run->body_shift);
     free(run->body_start);
     free(run->body_carry);
+    free(run->body_water);
     silt_uplift_free(&run->uplift);
     free(run->gap_force);
     free(run->x_old);
