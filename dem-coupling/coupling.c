@@ -674,7 +674,9 @@ static int coupling_process(const silt_coupling *c) { return silt_dem_process(c-
 static int coupling_outline(const silt_coupling *c, int body, double h, double *point, int capacity) {
     const silt_solid *skin = &c->body[body].skin;
     if (c->dim == 2)
-        return silt_outline_nodes(&c->body[body].shape, silt_min(h, silt_coupling_body_size(c->scene, &c->scene->body[body], h)), point, capacity);
+        return silt_outline_nodes(&c->body[body].shape,
+                                  c->scene->fluid.on ? silt_min(h, silt_coupling_body_size(c->scene, &c->scene->body[body], h)) : h, point,
+                                  capacity);
     if (point != NULL)
         memcpy(point, skin->point, (size_t)(capacity < skin->n_point ? capacity : skin->n_point) * sizeof *skin->point);
     return skin->n_point;

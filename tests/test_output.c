@@ -175,6 +175,32 @@ static void test_store_failures(void **state) {
     assert_int_equal(silt_store_commit(&store, &err), SILT_FAILED);
     assert_false(exists("b.h5"));
 
+    // any other byte is found out, also where HDF5 would read another number
+    assert_int_equal(silt_store_create(&store, place("c.h5"), &err), SILT_OK);
+    assert_int_equal(silt_store_put(store, "x", STORE_DOUBLE, 1000, real, &err), SILT_OK);
+    assert_int_equal(silt_store_commit(&store, &err), SILT_OK);
+    struct stat whole;
+    assert_int_equal(stat(place("c.h5"), &whole), 0);
+    for (int part = 0; part <= 64; part++) {
+        FILE *damaged = fopen(place("c.h5"), "r+b");
+        assert_non_null(damaged);
+        const long at = (long)(whole.st_size - 1) * part / 64;
+        for (int turn = 0; turn < 2; turn++) {
+            assert_int_equal(fseek(damaged, at, SEEK_SET), 0);
+            const int byte = fgetc(damaged);
+            assert_int_equal(fseek(damaged, at, SEEK_SET), 0);
+            assert_int_equal(fputc(byte ^ 1, damaged), byte ^ 1);
+            assert_int_equal(fflush(damaged), 0);
+            // damaged in the first turn, mended in the second
+            assert_int_equal(silt_store_open(&store, place("c.h5"), &err), turn ? SILT_OK : SILT_FAILED);
+            if (turn)
+                silt_store_close(&store);
+            else
+                contains(err.text, "damaged");
+        }
+        fclose(damaged);
+    }
+
     // cut short
     assert_int_equal(silt_store_create(&store, place("b.h5"), &err), SILT_OK);
     assert_int_equal(silt_store_put(store, "x", STORE_DOUBLE, 1000, real, &err), SILT_OK);
@@ -376,11 +402,27 @@ static void test_history_reopen(void **state) {
 
 // ---------------------------------------------------------------- frames
 
+// a copy of a frame with the seal of a checkpoint behind it: a word, and the hash of what stands before
+static const char *sealed(const char *file) {
+    struct stat status;
+    assert_int_equal(stat(place(file), &status), 0);
+    const size_t size = (size_t)status.st_size;
+    char *bytes = silt_alloc(size, 1);
+    FILE *from = fopen(place(file), "rb"), *to = fopen(place("sealed.h5"), "wb");
+    assert_true(from && to && fread(bytes, 1, size, from) == size && fwrite(bytes, 1, size, to) == size);
+    const uint64_t hash = silt_hash(0, bytes, size);
+    assert_true(fwrite("siltseal", 8, 1, to) == 1 && fwrite(&hash, sizeof hash, 1, to) == 1);
+    fclose(from);
+    fclose(to);
+    free(bytes);
+    return place("sealed.h5");
+}
+
 // frames are read with the checkpoint reader: it insists on names, types and counts
 static void values(const char *file, const char *name, silt_store_type type, size_t n, void *data) {
     silt_error err = {0};
     silt_store *store = NULL;
-    if (silt_store_open(&store, place(file), &err) || silt_store_take(store, name, type, n, data, &err))
+    if (silt_store_open(&store, sealed(file), &err) || silt_store_take(store, name, type, n, data, &err))
         fail_msg("%s", err.text);
     silt_store_close(&store);
 }

@@ -217,6 +217,8 @@ static double gap_width(const silt_mesh *mesh, const silt_cell_set *rim, const i
                     shortest = group[a] == group[b] ? 0 : length[a][b];
                     next = b;
                 }
+        if (next < 0) // lengths that are no numbers
+            return HUGE_VAL;
         reached[next] = true;
         widest = silt_max(widest, shortest);
     }

@@ -10,8 +10,11 @@
 
 /** an empty HDF5 file in memory; negative when HDF5 refuses. The name is for messages only. */
 hid_t silt_image_create(const char *name);
-/** Writes the file to path, with sync down to the disk, then closes it whatever happened. @return 0, or errno (EIO:
- * HDF5 refused) */
-int silt_image_write(hid_t file, const char *path, bool sync);
+/** Writes the file to path, then closes it whatever happened.
+ * @param sealed  down to the disk, with a seal behind it that tells whether it is whole
+ * @return 0, or errno (EIO: HDF5 refused) */
+int silt_image_write(hid_t file, const char *path, bool sealed);
+/** true when the file has its seal and every byte is as it was written */
+bool silt_image_sealed(const char *path);
 
 #endif

@@ -96,12 +96,25 @@ done:
     return status;
 }
 
+static bool store_signed(const char *path) {
+    static const char signature[8] = {(char)0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
+    char found[sizeof signature] = {0};
+    FILE *from = fopen(path, "rb");
+    const bool read = from && fread(found, sizeof found, 1, from) == 1;
+    if (from)
+        fclose(from);
+    return read && memcmp(found, signature, sizeof found) == 0;
+}
+
 silt_status silt_store_open(silt_store **store, const char *path, silt_error *err) {
     store_quiet();
     if (access(path, R_OK) != 0)
         return silt_fail(err, SILT_FAILED, "%s: cannot be read (%s)", path, strerror(errno));
-    if (H5Fis_hdf5(path) <= 0)
+    // HDF5 would take other numbers for those that were written, and crash in some damaged files
+    if (!store_signed(path))
         return silt_fail(err, SILT_FAILED, "%s: not an HDF5 file, or its beginning is damaged", path);
+    if (!silt_image_sealed(path))
+        return silt_fail(err, SILT_FAILED, "%s: damaged or cut short", path);
     silt_store *s = silt_alloc(1, sizeof *s);
     s->path = silt_text("%s", path);
     hid_t access_list = H5Pcreate(H5P_FILE_ACCESS);

@@ -5,6 +5,7 @@
 #define BODY_THROWN 10 // cells that a body may be thrown over in a step that cannot be cut any more
 #define BODY_MOST 0.5  // of them, that it then moves
 #define ROW 6 // numbers of a body: force and torque, or velocity and angular velocity
+#define WET_CHANGED 0.25 // of a body's wet nodes: then what is kept of the water at it is old
 
 // rigid modes of a dimension
 static const int mode_plane[] = {0, 1, 5}, mode_space[] = {0, 1, 2, 3, 4, 5};
@@ -163,7 +164,11 @@ static bool mode_motion(const silt_run *run, int b, int mode, double *motion) {
             arm[d] = run->fluid.x_mid[D * i + d] - 0.5 * (run->body_before[b].x[d] + run->body_after[b].x[d]);
         cross(axis, arm, v);
         for (int d = 0; d < D; d++)
-            motion[D * i + d] = mode < 3 ? axis[d] : v[d];
+            motion[D * i + d] = v[d] = mode < 3 ? axis[d] : v[d];
+        // along a surface where it slips the water does what it does
+        silt_hold_project(&run->fluid, i, v);
+        for (int d = 0; d < D; d++)
+            motion[D * i + d] -= v[d];
     }
     return wet;
 }
@@ -247,34 +252,111 @@ static silt_impedance impedance_begin(const silt_run *run) {
     return z;
 }
 
-// one solve a mode; its forces on all bodies are a column
-static silt_status impedance_solve(silt_run *run, const silt_step *step, silt_impedance *z, silt_error *err) {
-    const int D = silt_nodes_dim(&run->nodes);
-    const size_t n = (size_t)(D * run->nodes.count) + 1;
-    double *motion = silt_alloc(n, sizeof *motion), *reaction = silt_alloc(n, sizeof *reaction);
-    double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force), *p = silt_alloc(n, sizeof *p);
+/** room for the solves of an impedance */
+typedef struct silt_mode_room {
+    double *motion, *reaction, *p, *force; // owned
+} silt_mode_room;
+
+// one solve: the forces of a mode on all bodies are a column
+static silt_status impedance_column(silt_run *run, const silt_step *step, silt_impedance *z, silt_mode_room *room, int row, silt_error *err) {
     const double per_acceleration = run->fluid.theta * run->dt;
-    silt_status status = SILT_OK;
-    for (int l = 0; l < z->n_live && status == SILT_OK; l++) {
-        const int row = z->live[l], k = row / ROW;
-        if (!mode_motion(run, z->body[k], row % ROW, motion))
-            continue;
-        status = silt_fluid_mode(&run->fluid, step, motion, reaction, p, err);
-        sum_bodies(run, reaction, per_acceleration, force);
-        silt_uplift_force(run->uplift, run, p, -per_acceleration, force);
-        for (int o = 0; o < z->n; o++)
-            for (int r = 0; r < ROW; r++)
-                z->water[(ROW * o + r) * z->size + row] = force[ROW * z->body[o] + r];
-    }
+    if (!mode_motion(run, z->body[row / ROW], row % ROW, room->motion))
+        return SILT_OK;
+    SILT_TRY(silt_fluid_mode(&run->fluid, step, room->motion, room->reaction, room->p, err));
+    sum_bodies(run, room->reaction, per_acceleration, room->force);
+    silt_uplift_force(run->uplift, run, room->p, -per_acceleration, room->force);
+    for (int o = 0; o < z->n; o++)
+        for (int r = 0; r < ROW; r++)
+            z->water[(ROW * o + r) * z->size + row] = room->force[ROW * z->body[o] + r];
+    return SILT_OK;
+}
+
+static void impedance_symmetric(silt_impedance *z) {
     for (int r = 0; r < z->size; r++)
         for (int c = 0; c < r; c++) {
             double *a = &z->water[r * z->size + c], *b = &z->water[c * z->size + r];
             *a = *b = 0.5 * (*a + *b);
         }
-    free(motion);
-    free(reaction);
-    free(force);
-    free(p);
+}
+
+// every mode of every body, with what they do to each other
+static silt_status impedance_whole(silt_run *run, const silt_step *step, silt_impedance *z, silt_mode_room *room, silt_error *err) {
+    for (int l = 0; l < z->n_live; l++)
+        SILT_TRY(impedance_column(run, step, z, room, z->live[l], err));
+    impedance_symmetric(z);
+    return SILT_OK;
+}
+
+// body k's own block with both its frames turned by q
+static void block_turned(const double q[4], const double *block, double *out) {
+    double half[ROW * ROW], x[3], y[3];
+    for (int r = 0; r < ROW; r++)
+        for (int h = 0; h < ROW; h += 3)
+            quaternion_turn(q, block + ROW * r + h, half + ROW * r + h);
+    for (int c = 0; c < ROW; c++)
+        for (int h = 0; h < ROW; h += 3) {
+            for (int d = 0; d < 3; d++)
+                x[d] = half[ROW * (h + d) + c];
+            quaternion_turn(q, x, y);
+            for (int d = 0; d < 3; d++)
+                out[ROW * (h + d) + c] = y[d];
+        }
+}
+
+static int wet_nodes(const silt_run *run, int b) {
+    int n = 0;
+    for (int i = 0; i < run->fluid.n_node; i++)
+        n += run->nodes.kind[i] == NODE_BODY && run->nodes.owner[i] == b && run->mesh.wet[i];
+    return n;
+}
+
+static bool lives(const silt_impedance *z, int k) {
+    for (int l = 0; l < z->n_live; l++)
+        if (z->live[l] / ROW == k)
+            return true;
+    return false;
+}
+
+/** Every body's own block as it was kept in its own frame; one body in turn is solved for anew, and each whose wet surface has changed
+ * much. What bodies do to each other is left to what is owed to them. */
+static silt_status impedance_kept(silt_run *run, const silt_step *step, silt_impedance *z, silt_mode_room *room, silt_error *err) {
+    double block[ROW * ROW];
+    SILT_RESERVE(run->body_water, run->body_water_capacity, run->n_body_before + 1);
+    for (int k = 0; k < z->n; k++) {
+        const int b = z->body[k], wet = wet_nodes(run, b);
+        if (!lives(z, k))
+            continue;
+        const double *q = run->body_before[b].q, back[4] = {q[0], -q[1], -q[2], -q[3]};
+        silt_body_water *kept = &run->body_water[b];
+        if (run->step % z->n != k && fabs(wet - kept->wet) <= WET_CHANGED * kept->wet)
+            continue;
+        for (int m = 0; m < ROW; m++)
+            SILT_TRY(impedance_column(run, step, z, room, ROW * k + m, err));
+        for (int r = 0; r < ROW; r++)
+            for (int c = 0; c < ROW; c++)
+                block[ROW * r + c] = 0.5 * (z->water[(ROW * k + r) * z->size + ROW * k + c] + z->water[(ROW * k + c) * z->size + ROW * k + r]);
+        block_turned(back, block, kept->inertia);
+        kept->wet = wet;
+    }
+    memset(z->water, 0, (size_t)z->size * (size_t)z->size * sizeof *z->water);
+    for (int k = 0; k < z->n; k++) {
+        block_turned(run->body_before[z->body[k]].q, run->body_water[z->body[k]].inertia, block);
+        for (int r = 0; r < ROW; r++)
+            memcpy(z->water + (ROW * k + r) * z->size + ROW * k, block + ROW * r, ROW * sizeof *block);
+    }
+    return SILT_OK;
+}
+
+static silt_status impedance_solve(silt_run *run, const silt_step *step, silt_impedance *z, silt_error *err) {
+    const int D = silt_nodes_dim(&run->nodes);
+    const size_t n = (size_t)(D * run->nodes.count) + 1;
+    silt_mode_room room = {.motion = silt_alloc(n, sizeof(double)), .reaction = silt_alloc(n, sizeof(double)), .p = silt_alloc(n, sizeof(double)),
+                           .force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof(double))};
+    const silt_status status = (D == 3 && z->n > 1 ? impedance_kept : impedance_whole)(run, step, z, &room, err);
+    free(room.motion);
+    free(room.reaction);
+    free(room.force);
+    free(room.p);
     return status;
 }
 

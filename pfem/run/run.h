@@ -23,6 +23,12 @@ typedef struct silt_rest {
 
 typedef struct silt_uplift silt_uplift; // uplift.c
 
+/** what is kept of the water at a body in space, in the body's frame */
+typedef struct silt_body_water {
+    double inertia[36]; // kg, kg m, kg m2: its force and torque per acceleration, turned round
+    double wet;         // nodes on the body when it was found, 0: never
+} silt_body_water;
+
 struct silt_run {
     const silt_scene *scene;
     silt_scene *scene_own; // owned, the same where a run was taken up again, else NULL
@@ -90,9 +96,12 @@ struct silt_run {
     struct silt_body *body_before; // owned, poses at the start of the step
     int body_after_capacity, body_velocity_capacity, body_shift_capacity, body_carry_capacity;
     struct silt_body *body_after;  // owned, poses at its end, as far as they are known
-    double *body_velocity, *body_shift, *gap_force; // owned, dim per node, see silt_step
+    double *body_velocity, *body_shift, *gap_force, *body_start; // owned, dim per node, see silt_step
+    int body_start_capacity;
     int gap_force_capacity;
     bool gaps;                     // there are any
+    silt_body_water *body_water;   // owned, in space with more bodies than one
+    int body_water_capacity;
     double (*body_carry)[6];       // owned, N s and N m s per m: what the water gave bodies and they have not received yet
     silt_uplift *uplift;           // owned
     double body_error;             // what weight, contacts and water leave open of bodies' momentum, relative to them

@@ -13,13 +13,7 @@ static void check_blocks(silt_reader *reader, const silt_scene *scene) {
     const silt_tree *bodies = silt_tree_item(root, "bodies"), *fluid = silt_tree_item(root, "fluid");
     const silt_tree *bed = silt_tree_item(root, "bed"), *grains = silt_tree_item(root, "grains");
     bool has_bodies = scene->n_body > 0;
-    if (scene->dimension == 3) {
-        // the others were refused already
-        bodies = NULL;
-        if (!fluid && !grains)
-            silt_complain(reader, root,
-                          "key 'fluid': found neither water nor grains, allowed a scene with at least one of fluid, grains");
-    } else if (!fluid && !grains && !has_bodies && !bodies)
+    if (!fluid && !grains && !has_bodies && !bodies)
         silt_complain(reader, root,
                       "key 'fluid': found neither water nor grains nor bodies, allowed a scene with at least "
                       "one of fluid, grains, bodies");

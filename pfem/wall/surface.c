@@ -271,7 +271,8 @@ static silt_status msh_nodes(msh_reader *m, bool blocks, silt_error *err) {
         free(tag);
         SILT_TRY(status);
     }
-    qsort(m->node, (size_t)m->n_node, sizeof *m->node, compare_nodes);
+    if (m->n_node)
+        qsort(m->node, (size_t)m->n_node, sizeof *m->node, compare_nodes);
     return SILT_OK;
 }
 
