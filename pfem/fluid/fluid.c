@@ -17,7 +17,7 @@
 
 void silt_fluid_clear(silt_fluid *f) {
     double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->start, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
-                       f->level_force, f->bed_force, f->level_brake, f->mass, f->volume,
+                       f->level_force, f->bed_force, f->ride, f->level_brake, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
                        f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->pressure_new, f->v_start, f->v_first, f->debt_first, f->normal, f->given, f->cg[0],
                        f->cg[1]};
@@ -171,8 +171,12 @@ static void find_excess(silt_fluid *f, const silt_step *s, double stiff, const d
             a[D * i + d] = s->mesh->wet[i] && f->mass[i] > 0 ? a[D * i + d] / f->mass[i] : 0;
         // such a body force is loaded at the nodes, not as a P1 field: it has no excess, whatever holds the nodes
         silt_hold_project(f, i, a + D * i);
-        for (int d = 0; s->body_velocity && s->nodes->kind[i] == NODE_BODY && d < D; d++)
-            a[D * i + d] = (f->w[D * i + d] - v[D * i + d]) / theta_dt;
+        if (s->body_velocity && s->nodes->kind[i] == NODE_BODY) {
+            double own[3];
+            for (int d = 0; d < D; d++)
+                own[d] = (f->w[D * i + d] - v[D * i + d]) / theta_dt;
+            silt_hold_replace(f, i, own, a + D * i);
+        }
         if (s->scene->fluid.force.kind != FORMULA_NONE) {
             double b[3];
             body_force(f, s, i, b);
@@ -351,8 +355,11 @@ static silt_status project_start(silt_fluid *f, const silt_step *s, const double
     silt_fluid_correct(f, s, f->increment, v);
     f->projected = before - kinetic_energy(f, s, v);
     for (int i = 0; i < f->n_node; i++)
-        if (s->mesh->wet[i])
-            memcpy(f->w + D * i, (own_start(s, i) ? f->given : v) + D * i, (size_t)D * sizeof(double));
+        if (s->mesh->wet[i]) {
+            memcpy(f->w + D * i, v + D * i, (size_t)D * sizeof(double));
+            if (own_start(s, i))
+                silt_hold_replace(f, i, f->given + D * i, f->w + D * i);
+        }
     return SILT_OK;
 }
 
@@ -706,6 +713,9 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     // kept apart until the step is accepted
     double *p = f->pressure_new, *v = f->v_start;
     memcpy(v, nodes->v, (size_t)D * (size_t)f->n_node * sizeof(double));
+    for (int i = 0; i < f->n_node && s->body_start; i++)
+        if (silt_hold_slips(s, i) && s->mesh->wet[i])
+            silt_hold_replace(f, i, s->body_start + D * i, nodes->v + D * i);
     for (int i = 0; i < f->n_node; i++)
         // with the Laplacian the surface's pressure is prescribed
         p[i] = s->mesh->wet[i] && !(def->pressure == PRESSURE_LAPLACIAN && s->mesh->surface[i]) ? nodes->p[i] : 0;
@@ -725,11 +735,7 @@ silt_status silt_fluid_again(silt_fluid *f, const silt_step *s, silt_error *err)
     memcpy(nodes->v, f->v_first, (size_t)D * (size_t)f->n_node * sizeof(double));
     memcpy(nodes->debt, f->debt_first, (size_t)f->n_node * sizeof(double));
     f->given_back = f->given_first;
-    for (int i = 0; i < f->n_node; i++)
-        for (int d = 0; nodes->kind[i] == NODE_BODY && d < D; d++) {
-            f->given[D * i + d] = s->body_velocity[D * i + d];
-            f->w[D * i + d] = s->mesh->wet[i] ? f->given[D * i + d] : 0;
-        }
+    silt_hold_bodies_again(f, s);
     const int before = f->iterations;
     const silt_status status = s->mesh->n_cell ? fluid_iterate(f, s, f->pressure_new, true, err) : SILT_OK;
     f->iterations += before;

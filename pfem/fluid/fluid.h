@@ -30,13 +30,14 @@ typedef struct silt_step {
     double time, dt;             // s, start and length
     // dim per node, m/s, of nodes on bodies: velocity of the momentum, and what carries their places beside it; NULL: the nodes' own, none
     const double *body_velocity, *body_shift;
+    const double *body_start; // dim per node, m/s, of nodes on bodies where water slips: the body's velocity as the step begins; NULL: none
     const double *gap_force; // dim per node, N, of the water in gaps too narrow for cells on what is at their mouths; NULL: none
 } silt_step;
 
 /** working space and results of a step; arrays grow only */
 typedef struct silt_fluid {
     int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity,
-        potential_capacity, stand_capacity, v_first_capacity, debt_first_capacity, bed_force_capacity, still_capacity, level_capacity, level_brake_capacity;
+        potential_capacity, stand_capacity, v_first_capacity, debt_first_capacity, bed_force_capacity, still_capacity, ride_capacity, level_capacity, level_brake_capacity;
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
@@ -49,8 +50,10 @@ typedef struct silt_fluid {
     double *shift;        // owned, dim per node, m/s: carries positions, not momentum, to where debts are paid; NULL without volume control
     double *level_force;  // owned, dim per node, N, of the water behind openings with a level; NULL without such openings
     double *level_brake;  // owned, per node, kg/s, part of friction: pressure that water loses as it comes in, over its speed
-    uint8_t *still;       // owned, per node, 1: slips on the bed, stays in its place whatever its velocity; NULL without slip on a bed
-    double *bed_force;    // owned, dim per node, N: what a bent bed would push water at rest along with, taken back; NULL without slip on a bed
+    uint8_t *still;       // owned, per node, 1: slips on bed or body, whose place it keeps whatever its velocity; NULL without slip on them
+    double *ride;         // owned, dim per node, m/s, of these places; NULL without slip on bodies
+    double *bed_force;    // owned, dim per node, N: what a bent bed or body would push water at rest along with, taken back; NULL without
+                          // slip on them
     double *stand;        // owned, per node, kg/s, added to both sides where explicit viscosity would not be stable; NULL without
     double *potential;    // owned, per node, Pa, density times the potential of a central body force at x_mid; NULL without one
     double *belt;         // owned, dim per node, velocity of a wall's surface along itself; NULL without such walls
@@ -114,19 +117,26 @@ silt_status silt_fluid_step(silt_fluid *fluid, const silt_step *step, silt_error
  * step->body_shift): from where it ended, with its factor, theta and debts. To be used only after silt_fluid_step with
  * body_velocity. On failure the nodes are as before the step. */
 silt_status silt_fluid_again(silt_fluid *fluid, const silt_step *step, silt_error *err);
-/** component k of the velocity that the mesh moves with: w, the debts' shift, less a belt's own motion; none on the bed */
+/** component k of the velocity that the mesh moves with: w, the debts' shift, less a belt's own motion; where water slips on bed
+ * and bodies that of their surface */
 static inline double silt_mesh_velocity(const silt_fluid *f, int k) {
     if (f->still && f->still[k / f->dim])
-        return 0;
+        return f->ride ? f->ride[k] : 0;
     return f->w[k] + (f->shift ? f->shift[k] : 0) - (f->belt ? f->belt[k] : 0);
 }
 
 // hold.c -------------------------------------------------------------------------------------------------
 /** which velocity components the surroundings hold, and at what velocity */
 void silt_hold_nodes(silt_fluid *fluid, const silt_step *step);
-/** Renews what holds nodes on bent walls, from the facets of the present midpoint mesh: with any other normals a full tank cannot
- * keep its volume. */
+/** Renews what holds nodes on bent walls, and on bodies where water slips, from the facets of the present midpoint mesh: with any
+ * other normals a full tank cannot keep its volume. */
 void silt_hold_bent(silt_fluid *fluid, const silt_step *step);
+/** whether water slips at a node of a body */
+bool silt_hold_slips(const silt_step *step, int i);
+/** Takes the bodies' motion anew: at the velocity that they are held at, where water slips its normal part. */
+void silt_hold_bodies_again(silt_fluid *fluid, const silt_step *step);
+/** v with its held components those of `own` */
+void silt_hold_replace(const silt_fluid *fluid, int i, const double *own, double *v);
 /** silt_hold_impose; on bent walls the velocity keeps its size: turning does no work */
 void silt_hold_turn(const silt_fluid *fluid, int i, double *v);
 /** takes the held components out of a vector of dim numbers */

@@ -290,7 +290,7 @@ void silt_assemble_geometry(silt_fluid *f, const silt_step *step, double dt) {
     // most steps ask twice or three times for what is there: a fifth of their geometry
     if (midpoints(f, step->nodes->x, dt) || !f->shaped) {
         shapes_anywhere(f, step->mesh, step->nodes->x);
-        if (f->wall_normals.n_row)
+        if (f->wall_normals.n_row || f->ride)
             silt_hold_bent(f, step);
     }
     stabilisation(f, 2 * rho * per_time);

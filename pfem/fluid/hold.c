@@ -2,6 +2,7 @@
 #include "fluid.h"
 
 #define BED_SQUARE 0.1  // cosine between a line of free motion and a wall that it may go along
+#define BODY_SMOOTH 0.866 // cosine of the largest turn, 30 degrees, of a body's facet from the normal of a node that slides
 #define BED_FLUSH 0.866 // cosine of the largest turn, 30 degrees, between bed and a wall that goes on from it
 
 void silt_hold_project_held(const silt_fluid *f, int i, double *v) {
@@ -43,19 +44,6 @@ void silt_hold_turn(const silt_fluid *f, int i, double *v) {
     const double factor = along > 0.5 * whole ? sqrt(whole / along) : 1;
     for (int d = 0; d < D; d++)
         v[d] = f->given[D * i + d] + factor * v[d];
-}
-
-void silt_hold_bent(silt_fluid *f, const silt_step *s) {
-    const int D = f->dim;
-    silt_wall_normals_take(&f->wall_normals, s->walls, s->nodes, s->mesh, f->x_mid);
-    for (int i = 0; i < f->n_node; i++) {
-        if (s->nodes->kind[i] != NODE_FLUID || f->wall_normals.row[i] < 0)
-            continue;
-        double vector[3], given[3];
-        f->hold[i] = (uint8_t)silt_walls_held(s->walls, s->scene, &f->wall_normals, s->nodes, i, vector, given);
-        memcpy(f->normal + D * i, vector, (size_t)D * sizeof(double));
-        memcpy(f->given + D * i, given, (size_t)D * sizeof(double));
-    }
 }
 
 // normal of a facet into the water, as long as the edge, in space the face's area
@@ -172,6 +160,16 @@ static void hold_bed(silt_fluid *f, const silt_step *s) {
         f->still[i] = s->nodes->kind[i] == NODE_BED;
 }
 
+// what the pressure of water at rest gives a node of a facet for its being lower at the others, per measure of the facet
+static double rest_push(const silt_fluid *f, const silt_step *s, const double *x, const int *facet, int i) {
+    const int D = f->dim;
+    double rise = 0;
+    for (int a = 0; a < D; a++)
+        for (int d = 0; d < D; d++)
+            rise += s->scene->gravity[d] * silt_shortest(s->mesh, d, x[D * facet[a] + d] - x[D * i + d]);
+    return s->scene->fluid.density * rise / (D * (D + 1)); // int N_i N_j of an edge is 1/6 of its length, of a face 1/12 of its area
+}
+
 // On a bed that bends, the pressure of water at rest pushes a node along the one direction that stands for all its facets: on the
 // facet that goes down it is higher. With p - p_i = rho g.(x - x_i) that push is known, and taken back: water over a hill of bed stays at
 // rest (1.8 m/s and 7 % of the volume before, tests/scenes/bed-rest.yaml).
@@ -191,17 +189,196 @@ static void hold_bed_rest(silt_fluid *f, const silt_step *s) {
             const int i = facet[c];
             if (s->nodes->kind[i] != NODE_BED || f->hold[i] == HOLD_ALL)
                 continue;
-            double rise = 0;
-            for (int a = 0; a < D; a++)
-                for (int d = 0; d < D; d++)
-                    rise += s->scene->gravity[d] * silt_shortest(mesh, d, x[D * facet[a] + d] - x[D * i + d]);
-            for (int d = 0; d < D; d++) // int N_i N_j of an edge is 1/6 of its length, of a face 1/12 of its area
-                f->bed_force[D * i + d] += s->scene->fluid.density * rise / (D * (D + 1)) * n[d];
+            const double push = rest_push(f, s, x, facet, i);
+            for (int d = 0; d < D; d++)
+                f->bed_force[D * i + d] += push * n[d];
         }
     }
     for (int i = 0; i < f->n_node; i++)
         if (s->nodes->kind[i] == NODE_BED)
             silt_hold_project(f, i, f->bed_force + D * i);
+}
+
+// ---------------------------------------------------------------- slip on bodies
+
+bool silt_hold_slips(const silt_step *s, int i) {
+    return s->nodes->kind[i] == NODE_BODY && s->scene->body[s->nodes->owner[i]].condition == WALL_SLIP;
+}
+
+void silt_hold_replace(const silt_fluid *f, int i, const double *own, double *v) {
+    double held[3], loose[3];
+    for (int d = 0; d < f->dim; d++)
+        held[d] = loose[d] = own[d];
+    silt_hold_project(f, i, loose);
+    silt_hold_project(f, i, v);
+    for (int d = 0; d < f->dim; d++)
+        v[d] = f->hold[i] == HOLD_ALL ? held[d] : v[d] + (held[d] - loose[d]);
+}
+
+// normal of a facet that moves evenly, mean over the step: the continuity of a cell in space asks for that one, in the plane it is
+// that of the midpoint
+static void facet_mean_normal(const silt_fluid *f, const silt_step *s, const double *x_mid, const int *facet, double n[3]) {
+    facet_normal(s->mesh, x_mid, facet, n);
+    if (f->dim != 3 || x_mid == s->nodes->x)
+        return;
+    double end[9], first[3], last[3];
+    const int own[3] = {0, 1, 2};
+    for (int c = 0; c < 3; c++)
+        for (int d = 0; d < 3; d++)
+            end[3 * c + d] = 2 * x_mid[3 * facet[c] + d] - s->nodes->x[3 * facet[c] + d];
+    facet_normal(s->mesh, s->nodes->x, facet, first);
+    facet_normal(s->mesh, end, own, last);
+    for (int d = 0; d < 3; d++)
+        n[d] = (first[d] + 4 * n[d] + last[d]) / 6;
+}
+
+// velocity of the body at its node
+static void body_given(silt_fluid *f, const silt_step *s, int i) {
+    for (int d = 0; d < f->dim; d++)
+        f->given[f->dim * i + d] = s->body_velocity ? s->body_velocity[f->dim * i + d] : 0;
+}
+
+static bool body_loose(const silt_fluid *f, const silt_step *s, int i) {
+    return f->hold[i] == HOLD_NORMAL && silt_hold_slips(s, i);
+}
+
+/** Normals of nodes that are held along theirs only: with the sum of their facets', weighted with size, what goes through the body's
+ * surface is what the body's motion asks for, whatever water does along it. The push of water at rest along a bent body is taken back
+ * as on a bed. */
+static void body_normals(silt_fluid *f, const silt_step *s, const double *x_mid) {
+    const silt_mesh *mesh = s->mesh;
+    const int D = f->dim;
+    for (int i = 0; i < f->n_node; i++)
+        for (int d = 0; d < D && body_loose(f, s, i); d++)
+            f->normal[D * i + d] = f->bed_force[D * i + d] = 0;
+    for (int k = 0; k < mesh->n_facet; k++) {
+        const int *facet = mesh->facet[k];
+        if (mesh->facet_kind[k] != FACET_BODY || !silt_hold_slips(s, facet[0]))
+            continue;
+        double n[3];
+        facet_mean_normal(f, s, x_mid, facet, n);
+        for (int c = 0; c < D; c++) {
+            const int i = facet[c];
+            if (!body_loose(f, s, i))
+                continue;
+            const double push = rest_push(f, s, x_mid, facet, i);
+            for (int d = 0; d < D; d++) {
+                f->normal[D * i + d] += n[d];
+                f->bed_force[D * i + d] += push * n[d];
+            }
+        }
+    }
+    for (int i = 0; i < f->n_node; i++) {
+        if (!body_loose(f, s, i))
+            continue;
+        double *n = f->normal + D * i, own[3];
+        const double length = sqrt(silt_dot(D, n, n));
+        for (int d = 0; d < D; d++)
+            n[d] /= length;
+        silt_hold_project(f, i, f->bed_force + D * i);
+        body_given(f, s, i);
+        memcpy(own, f->given + D * i, (size_t)D * sizeof(double));
+        silt_hold_project(f, i, own);
+        for (int d = 0; d < D; d++)
+            f->given[D * i + d] -= own[d];
+    }
+}
+
+// Where the body has an edge, and where its surface ends, at a waterline, a wall, another body, a node has no normal that would do:
+// it goes with the body.
+static void hold_body_edges(silt_fluid *f, const silt_step *s) {
+    const silt_mesh *mesh = s->mesh;
+    const int D = f->dim;
+    for (int i = 0; i < f->n_node; i++)
+        if (silt_hold_slips(s, i)) {
+            f->hold[i] = HOLD_ALL;
+            memset(f->normal + D * i, 0, (size_t)D * sizeof(double));
+        }
+    for (int pass = 0; pass < 2; pass++)
+        for (int k = 0; k < mesh->n_facet; k++)
+            for (int c = 0; c < D; c++) {
+                const int i = mesh->facet[k][c];
+                if (!silt_hold_slips(s, i))
+                    continue;
+                double n[3], *whole = f->normal + D * i;
+                facet_normal(mesh, s->nodes->x, mesh->facet[k], n);
+                if (pass == 0) {
+                    f->hold[i] = HOLD_NORMAL;
+                    for (int d = 0; d < D; d++)
+                        whole[d] += n[d];
+                } else if (mesh->facet_kind[k] != FACET_BODY ||
+                           !(silt_dot(D, n, whole) > BODY_SMOOTH * sqrt(silt_dot(D, n, n) * silt_dot(D, whole, whole))))
+                    f->hold[i] = HOLD_ALL;
+            }
+}
+
+// places of nodes that water slips at: they go with the body
+static void body_ride(silt_fluid *f, const silt_step *s) {
+    for (int i = 0; i < f->n_node; i++) {
+        if (!silt_hold_slips(s, i))
+            continue;
+        f->still[i] = 1;
+        for (int k = f->dim * i; k < f->dim * (i + 1); k++)
+            f->ride[k] = s->body_velocity ? s->body_velocity[k] + s->body_shift[k] : 0;
+    }
+}
+
+static void hold_bodies(silt_fluid *f, const silt_step *s) {
+    const int n = f->n_node, D = f->dim;
+    bool any = false;
+    for (int b = 0; b < s->scene->n_body; b++)
+        any |= s->scene->body[b].condition == WALL_SLIP;
+    if (!any)
+        return;
+    const bool bed = s->scene->bed.on && s->scene->bed.condition != WALL_NO_SLIP;
+    SILT_RESERVE(f->ride, f->ride_capacity, D * n + 1);
+    SILT_RESERVE(f->still, f->still_capacity, n + 1);
+    SILT_RESERVE(f->bed_force, f->bed_force_capacity, D * n + 1);
+    memset(f->ride, 0, (size_t)(D * n) * sizeof(double));
+    if (!bed) {
+        memset(f->still, 0, (size_t)n);
+        memset(f->bed_force, 0, (size_t)(D * n) * sizeof(double));
+    }
+    for (int i = 0; i < n; i++)
+        if (silt_hold_slips(s, i))
+            body_given(f, s, i);
+    hold_body_edges(f, s);
+    body_ride(f, s);
+    body_normals(f, s, s->nodes->x);
+}
+
+void silt_hold_bodies_again(silt_fluid *f, const silt_step *s) {
+    const int D = f->dim;
+    for (int i = 0; i < f->n_node; i++) {
+        if (s->nodes->kind[i] != NODE_BODY)
+            continue;
+        body_given(f, s, i);
+        if (s->mesh->wet[i])
+            silt_hold_replace(f, i, f->given + D * i, f->w + D * i);
+        else
+            memset(f->w + D * i, 0, (size_t)D * sizeof(double));
+    }
+    if (!f->ride)
+        return;
+    body_ride(f, s);
+    f->shaped = false; // the normals are renewed with the midpoint mesh, whether it is another one or not
+}
+
+void silt_hold_bent(silt_fluid *f, const silt_step *s) {
+    const int D = f->dim;
+    if (f->ride)
+        body_normals(f, s, f->x_mid);
+    if (!f->wall_normals.n_row)
+        return;
+    silt_wall_normals_take(&f->wall_normals, s->walls, s->nodes, s->mesh, f->x_mid);
+    for (int i = 0; i < f->n_node; i++) {
+        if (s->nodes->kind[i] != NODE_FLUID || f->wall_normals.row[i] < 0)
+            continue;
+        double vector[3], given[3];
+        f->hold[i] = (uint8_t)silt_walls_held(s->walls, s->scene, &f->wall_normals, s->nodes, i, vector, given);
+        memcpy(f->normal + D * i, vector, (size_t)D * sizeof(double));
+        memcpy(f->given + D * i, given, (size_t)D * sizeof(double));
+    }
 }
 
 void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
@@ -235,4 +412,5 @@ void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
         hold_bed(f, s);
         hold_bed_rest(f, s);
     }
+    hold_bodies(f, s);
 }

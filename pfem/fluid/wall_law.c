@@ -49,7 +49,7 @@ static int condition_of(const silt_scene *scene, const silt_walls *walls, const 
             *roughness = silt_bed_roughness(scene);
         return scene->bed.condition == WALL_DEFAULT ? WALL_NO_SLIP : (int)scene->bed.condition;
     case FACET_BODY:
-        return WALL_NO_SLIP;
+        return (int)scene->body[nodes->owner[mesh->facet[facet][0]]].condition;
     case FACET_WALL:
         *element = walls ? facet_element(walls, nodes, mesh->facet[facet], mesh->dim == 3 ? 3 : 2) : -1;
         if (*element < 0 || !walls->slip[*element])

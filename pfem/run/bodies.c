@@ -164,7 +164,11 @@ static bool mode_motion(const silt_run *run, int b, int mode, double *motion) {
             arm[d] = run->fluid.x_mid[D * i + d] - 0.5 * (run->body_before[b].x[d] + run->body_after[b].x[d]);
         cross(axis, arm, v);
         for (int d = 0; d < D; d++)
-            motion[D * i + d] = mode < 3 ? axis[d] : v[d];
+            motion[D * i + d] = v[d] = mode < 3 ? axis[d] : v[d];
+        // along a surface where it slips the water does what it does
+        silt_hold_project(&run->fluid, i, v);
+        for (int d = 0; d < D; d++)
+            motion[D * i + d] -= v[d];
     }
     return wet;
 }

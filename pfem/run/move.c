@@ -1,11 +1,22 @@
 // nodes to their new places: water with its velocity, drops in free flight, inlets back to their line, bodies with theirs
 #include "run.h"
 
+static bool slip_on_bodies(const silt_scene *scene) {
+    bool any = false;
+    for (int b = 0; b < scene->n_body; b++)
+        any |= scene->body[b].condition == WALL_SLIP;
+    return any;
+}
+
 void silt_run_prescribe(silt_run *run) {
     const silt_scene *scene = run->scene;
     silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
     const silt_body_state *bodies = run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
+    if (bodies && slip_on_bodies(scene)) {
+        SILT_RESERVE(run->body_start, run->body_start_capacity, D * nodes->count + 1);
+        memset(run->body_start, 0, (size_t)(D * nodes->count) * sizeof(double));
+    }
     for (int i = 0; i < nodes->count; i++) {
         double *v = nodes->v + D * i;
         if (nodes->kind[i] == NODE_INLET) {
@@ -15,6 +26,12 @@ void silt_run_prescribe(silt_run *run) {
                 v[d] = factor * inlet->velocity[d];
         } else if (nodes->kind[i] == NODE_BODY && bodies) {
             const struct silt_body *body = &bodies->body[nodes->owner[i]];
+            if (scene->body[nodes->owner[i]].condition == WALL_SLIP) {
+                double *own = run->body_start + D * i;
+                silt_run_body_velocity(body, nodes->x + D * i, D, own);
+                if (i < run->mesh.n_node && run->mesh.wet[i]) // it has a velocity of its own along the surface
+                    continue;
+            }
             silt_run_body_velocity(body, nodes->x + D * i, D, v);
         } else if (nodes->kind[i] == NODE_CORNER) {
             double wall[3] = {0};
@@ -114,7 +131,12 @@ static void place_bodies(silt_run *run) {
         double place[3];
         silt_run_body_turn(&run->body_before[nodes->owner[i]], now, run->x_old + D * i, D, place);
         memcpy(nodes->x + D * i, place, (size_t)D * sizeof(double));
-        silt_run_body_velocity(now, place, D, nodes->v + D * i);
+        double own[3];
+        silt_run_body_velocity(now, place, D, own);
+        if (run->scene->body[nodes->owner[i]].condition == WALL_SLIP && run->mesh.wet[i])
+            silt_hold_replace(&run->fluid, i, own, nodes->v + D * i);
+        else
+            memcpy(nodes->v + D * i, own, (size_t)D * sizeof(double));
     }
 }
 
@@ -163,6 +185,12 @@ static void expel(silt_run *run) {
     }
 }
 
+// of water along the surface that it slips on
+static void slip_velocity(const silt_fluid *fluid, int i, double w[3]) {
+    for (int d = 0; d < fluid->dim; d++)
+        w[d] = fluid->w[fluid->dim * i + d] - (fluid->ride ? fluid->ride[fluid->dim * i + d] : 0);
+}
+
 // Along the facet's edge: the water that stands at an end came from the other one. Adds to fresh.
 static void carry_edge(const silt_run *run, const int *facet, double *fresh) {
     const silt_fluid *fluid = &run->fluid;
@@ -172,7 +200,9 @@ static void carry_edge(const silt_run *run, const int *facet, double *fresh) {
         if (fluid->hold[i] != HOLD_NORMAL)
             continue;
         const double dx = run->x_old[2 * i] - run->x_old[2 * up], dy = run->x_old[2 * i + 1] - run->x_old[2 * up + 1];
-        const double share = run->dt * (fluid->w[2 * i] * dx + fluid->w[2 * i + 1] * dy) / (dx * dx + dy * dy);
+        double w[3];
+        slip_velocity(fluid, i, w);
+        const double share = run->dt * (w[0] * dx + w[1] * dy) / (dx * dx + dy * dy);
         for (int d = 0; d < 2 && share > 0; d++)
             fresh[2 * i + d] += silt_min(share, 1) * (v[2 * up + d] - v[2 * i + d]);
     }
@@ -186,13 +216,14 @@ static void carry_face(const silt_run *run, const int *facet, double *fresh) {
         const int i = facet[c], j = facet[(c + 1) % 3], k = facet[(c + 2) % 3];
         if (fluid->hold[i] == HOLD_ALL)
             continue;
-        double p[3], q[3];
+        double p[3], q[3], w[3];
+        slip_velocity(fluid, i, w);
         for (int d = 0; d < 3; d++) {
             p[d] = silt_shortest(&run->mesh, d, run->x_old[3 * j + d] - run->x_old[3 * i + d]);
             q[d] = silt_shortest(&run->mesh, d, run->x_old[3 * k + d] - run->x_old[3 * i + d]);
         }
         // - w dt = a p + b q
-        const double *w = fluid->w + 3 * i, pp = silt_dot(3, p, p), qq = silt_dot(3, q, q), pq = silt_dot(3, p, q);
+        const double pp = silt_dot(3, p, p), qq = silt_dot(3, q, q), pq = silt_dot(3, p, q);
         const double wp = -run->dt * silt_dot(3, w, p), wq = -run->dt * silt_dot(3, w, q), under = pp * qq - pq * pq;
         double a = (qq * wp - pq * wq) / under, b = (pp * wq - pq * wp) / under;
         if (!(a >= -1e-9 && b >= -1e-9))
@@ -205,9 +236,10 @@ static void carry_face(const silt_run *run, const int *facet, double *fresh) {
     }
 }
 
-// slip on the fixed nodes of the bed: the water that stands there now came from upstream along the surface
+// slip on the nodes of bed and bodies: the water that stands there now came from upstream along the surface
 static void carry_slip(silt_run *run) {
-    if (!run->scene->bed.on || run->scene->bed.condition == WALL_NO_SLIP)
+    const bool bed = run->scene->bed.on && run->scene->bed.condition != WALL_NO_SLIP, bodies = slip_on_bodies(run->scene);
+    if (!bed && !bodies)
         return;
     const silt_mesh *mesh = &run->mesh;
     const silt_fluid *fluid = &run->fluid;
@@ -216,10 +248,10 @@ static void carry_slip(silt_run *run) {
     double *fresh = run->fluid.scratch;
     memcpy(fresh, nodes->v, (size_t)(D * fluid->n_node) * sizeof(double));
     for (int k = 0; k < mesh->n_facet; k++)
-        if (mesh->facet_kind[k] == FACET_BED)
+        if ((bed && mesh->facet_kind[k] == FACET_BED) || (bodies && mesh->facet_kind[k] == FACET_BODY))
             (D == 3 ? carry_face : carry_edge)(run, mesh->facet[k], fresh);
     for (int i = 0; i < fluid->n_node; i++) {
-        if (nodes->kind[i] != NODE_BED || (fluid->hold[i] != HOLD_NORMAL && fluid->hold[i] != HOLD_LINE))
+        if (!fluid->still[i] || (fluid->hold[i] != HOLD_NORMAL && fluid->hold[i] != HOLD_LINE))
             continue;
         const double *n = fluid->normal + D * i, along = silt_dot(D, fresh + D * i, n);
         for (int d = 0; d < D; d++)

@@ -129,6 +129,7 @@ static silt_step water_see(silt_run *run) {
         step.body_velocity = run->body_velocity;
         step.body_shift = run->body_shift;
     }
+    step.body_start = run->body_start;
     step.gap_force = run->gaps ? run->gap_force : NULL;
     return step;
 }
@@ -442,6 +443,7 @@ void silt_run_free(silt_run *run) {
     free(run->body_after);
     free(run->body_velocity);
     free(run->body_shift);
+    free(run->body_start);
     free(run->body_carry);
     free(run->body_water);
     silt_uplift_free(&run->uplift);

@@ -96,7 +96,8 @@ struct silt_run {
     struct silt_body *body_before; // owned, poses at the start of the step
     int body_after_capacity, body_velocity_capacity, body_shift_capacity, body_carry_capacity;
     struct silt_body *body_after;  // owned, poses at its end, as far as they are known
-    double *body_velocity, *body_shift, *gap_force; // owned, dim per node, see silt_step
+    double *body_velocity, *body_shift, *gap_force, *body_start; // owned, dim per node, see silt_step
+    int body_start_capacity;
     int gap_force_capacity;
     bool gaps;                     // there are any
     silt_body_water *body_water;   // owned, in space with more bodies than one

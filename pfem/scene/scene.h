@@ -331,6 +331,7 @@ typedef struct silt_body_def {
     double density; // kg/m3
     double velocity[3];
     double spin[3]; // rad/s, 3-D, at the start
+    silt_condition condition; // of water on it, WALL_NO_SLIP or WALL_SLIP
     silt_motion motion;
     silt_series path;  // MOTION_PRESCRIBED: a path (silt_path_at)
     double path_scale; // 1, factor on the numbers of its file

@@ -17,6 +17,7 @@ static const silt_word scheme_words[] = {{"implicit", SCHEME_IMPLICIT}, {"fracti
 static const silt_word pressure_words[] = {{"consistent", PRESSURE_CONSISTENT}, {"laplacian", PRESSURE_LAPLACIAN}, {0}};
 static const silt_word condition_words[] = {
     {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
+static const silt_word body_condition_words[] = {{"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {0}};
 static const silt_word wall_condition_words[] = {
     {"default", WALL_DEFAULT}, {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
 static const silt_word flow_words[] = {{"turbulent", FLOW_TURBULENT}, {"laminar", FLOW_LAMINAR}, {0}};
@@ -568,6 +569,8 @@ static const silt_key body_rows[] = {
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_body_def, velocity), .doc = "at the start"},
     {"spin", KEY_POINT, .unit = "rad/s", .flags = KEY_SPACE, .fallback = "[0, 0, 0]", AT(silt_body_def, spin),
      .doc = "angular velocity at the start"},
+    {"condition", KEY_WORD, .fallback = "no-slip", .words = body_condition_words, AT(silt_body_def, condition),
+     .doc = "of the water at its surface; slip: water goes with the surface's normal only, and sticks to edges and at waterlines"},
     {"motion", KEY_WORD, .fallback = "free", .words = motion_words, AT(silt_body_def, motion),
      .doc = "free to move, held where it is, or moved by `path` whatever acts on it"},
     {"path", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_body_def, path),
