@@ -312,6 +312,25 @@ static void hold_body_edges(silt_fluid *f, const silt_step *s) {
             }
 }
 
+// something solid besides the body
+static bool other_solid(const silt_nodes *nodes, int body, int j) {
+    if (nodes->kind[j] == NODE_BODY)
+        return nodes->owner[j] != body;
+    return nodes->kind[j] == NODE_BED || nodes->kind[j] == NODE_CORNER || (nodes->kind[j] == NODE_FLUID && nodes->wall[j][0] >= 0);
+}
+
+// In a film of one cell between the body and something else water sticks: it has no velocity along it that the mesh could show.
+static void hold_body_films(silt_fluid *f, const silt_step *s) {
+    const int corners = f->dim + 1;
+    for (int e = 0; e < f->n_cell; e++) {
+        const int *cell = s->mesh->cell[e];
+        for (int a = 0; a < corners; a++)
+            for (int b = 0; b < corners && silt_hold_slips(s, cell[a]); b++)
+                if (other_solid(s->nodes, s->nodes->owner[cell[a]], cell[b]))
+                    f->hold[cell[a]] = HOLD_ALL;
+    }
+}
+
 // places of nodes that water slips at: they go with the body
 static void body_ride(silt_fluid *f, const silt_step *s) {
     for (int i = 0; i < f->n_node; i++) {
@@ -343,6 +362,7 @@ static void hold_bodies(silt_fluid *f, const silt_step *s) {
         if (silt_hold_slips(s, i))
             body_given(f, s, i);
     hold_body_edges(f, s);
+    hold_body_films(f, s);
     body_ride(f, s);
     body_normals(f, s, s->nodes->x);
 }

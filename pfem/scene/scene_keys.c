@@ -570,7 +570,7 @@ static const silt_key body_rows[] = {
     {"spin", KEY_POINT, .unit = "rad/s", .flags = KEY_SPACE, .fallback = "[0, 0, 0]", AT(silt_body_def, spin),
      .doc = "angular velocity at the start"},
     {"condition", KEY_WORD, .fallback = "no-slip", .words = body_condition_words, AT(silt_body_def, condition),
-     .doc = "of the water at its surface; slip: water goes with the surface's normal only, and sticks to edges and at waterlines"},
+     .doc = "of the water at its surface; slip: it goes with the surface's normal only, but sticks to edges, at waterlines and in films of one cell; not for bodies that strike walls"},
     {"motion", KEY_WORD, .fallback = "free", .words = motion_words, AT(silt_body_def, motion),
      .doc = "free to move, held where it is, or moved by `path` whatever acts on it"},
     {"path", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_body_def, path),
