@@ -579,7 +579,9 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, b
         bool solved;
         SILT_TRY(velocity_star(f, s, stiff > 0, drop, &solved, err));
         int worst_node = silt_star_continuity(f, s, p);
-        if (!solved && (f->worst <= strict * def->tolerance || silt_spray_lags(f, strict * def->tolerance))) {
+        const bool late = f->iterations >= most;
+        const double loose = 1e3 * def->tolerance; // enough then
+        if (!solved && (f->worst <= strict * def->tolerance || silt_spray_lags(f, strict * def->tolerance) || (late && f->worst < loose))) {
             SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->star));
             SILT_CLOCKED(momentum, status = silt_momentum_solve(f, s, f->force, 0, f->star, &solved, err));
             SILT_TRY(status);
@@ -591,7 +593,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, b
         const bool passed = def->scheme == SCHEME_IMPLICIT || stiff == 0 || f->iterations > 0;
         const bool fine = passed && f->worst <= (first ? 0.1 : 1) * strict * def->tolerance && (!first || silt_swirl(f, s) <= def->tolerance);
         // at the end of the iterations a small residual is accepted; a first pressure takes longer to meet its projection
-        if (fine || (!first && silt_spray_lags(f, strict * def->tolerance)) || (f->iterations >= most && f->worst < 1e3 * def->tolerance)) {
+        if (fine || (!first && silt_spray_lags(f, strict * def->tolerance)) || (late && f->worst < loose)) {
             memcpy(f->w, f->star, bytes);
             return silt_astray_node(f, s, err);
         }

@@ -314,10 +314,14 @@ static int shell_common(const shell *s, int a, int b) {
 }
 
 static bool shell_ring_locked(const shell *s, int i) {
-    for (int k = s->start[i]; k < s->start[i + 1]; k++)
+    for (int k = s->start[i]; k < s->start[i + 1]; k++) {
+        const int *face = s->face[s->ring[k]];
+        if (face[0] < 0) // died in this pass: its corners were locked then
+            return true;
         for (int c = 0; c < 3; c++)
-            if (s->locked[s->face[s->ring[k]][c]])
+            if (s->locked[face[c]])
                 return true;
+    }
     return false;
 }
 
