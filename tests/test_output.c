@@ -402,31 +402,6 @@ static void test_history_reopen(void **state) {
 
 // ---------------------------------------------------------------- frames
 
-// a copy of a frame with the seal of a checkpoint behind it: a word, and the hash of what stands before
-static const char *sealed(const char *file) {
-    struct stat status;
-    assert_int_equal(stat(place(file), &status), 0);
-    const size_t size = (size_t)status.st_size;
-    char *bytes = silt_alloc(size, 1);
-    FILE *from = fopen(place(file), "rb"), *to = fopen(place("sealed.h5"), "wb");
-    assert_true(from && to && fread(bytes, 1, size, from) == size && fwrite(bytes, 1, size, to) == size);
-    const uint64_t hash = silt_hash(0, bytes, size);
-    assert_true(fwrite("siltseal", 8, 1, to) == 1 && fwrite(&hash, sizeof hash, 1, to) == 1);
-    fclose(from);
-    fclose(to);
-    free(bytes);
-    return place("sealed.h5");
-}
-
-// frames are read with the checkpoint reader: it insists on names, types and counts
-static void values(const char *file, const char *name, silt_store_type type, size_t n, void *data) {
-    silt_error err = {0};
-    silt_store *store = NULL;
-    if (silt_store_open(&store, sealed(file), &err) || silt_store_take(store, name, type, n, data, &err))
-        fail_msg("%s", err.text);
-    silt_store_close(&store);
-}
-
 static void test_frames(void **state) {
     (void)state;
     world w;

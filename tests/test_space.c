@@ -238,14 +238,6 @@ static void test_wall_forces(void **state) {
 
 // ---------------------------------------------------------------- frames
 
-static void values(const char *file, const char *name, silt_store_type type, size_t n, void *data) {
-    silt_error err = {0};
-    silt_store *store = NULL;
-    if (silt_store_open(&store, place(file), &err) || silt_store_take(store, name, type, n, data, &err))
-        fail_msg("%s", err.text);
-    silt_store_close(&store);
-}
-
 static void test_frames(void **state) {
     (void)state;
     world w;

@@ -407,7 +407,8 @@ static void depth_of_cloud(bool scattered, double *wrong, double *worst) {
     silt_mesh_connect(&mesh, &nodes);
     for (int k = 0; k < mesh.n_facet; k++)
         mesh.facet_kind[k] = x[2 * mesh.facet[k][0] + 1] < 0.2 ? FACET_BODY : FACET_FREE;
-    silt_scene scene = {0};
+    silt_body_def body = {.condition = WALL_NO_SLIP};
+    silt_scene scene = {.n_body = 1, .body = &body};
     silt_walls walls = {0};
     silt_depth depth = {0};
     silt_depth_update(&depth, &scene, &walls, &nodes, &mesh, x);
