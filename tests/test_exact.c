@@ -7,26 +7,13 @@
 
 #include <cmocka.h>
 
+#include "check.h"
 #include "run.h"
 
 #include <unistd.h>
 
 #include <dirent.h>
 #include <sys/stat.h>
-
-static silt_error error;
-
-#define OK(call)                                                                                                       \
-    do {                                                                                                               \
-        error = (silt_error){0};                                                                                       \
-        if ((call) != SILT_OK)                                                                                         \
-            fail_msg("%s: %s", #call, error.text);                                                                     \
-    } while (0)
-
-static void near(double value, double expected, double tolerance, const char *what) {
-    if (!(fabs(value - expected) <= tolerance))
-        fail_msg("%s: %.10g, expected %.10g within %g", what, value, expected, tolerance);
-}
 
 // ---------------------------------------------------------------- runs
 

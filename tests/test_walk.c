@@ -10,20 +10,9 @@
 
 #include <cmocka.h>
 
-static silt_error error;
+#include "check.h"
+
 static const silt_coupling_type *const dem = &silt_coupling_dem;
-
-#define OK(call)                                                                                                       \
-    do {                                                                                                               \
-        error = (silt_error){0};                                                                                       \
-        if ((call) != SILT_OK)                                                                                         \
-            fail_msg("%s: %s", #call, error.text);                                                                     \
-    } while (0)
-
-static void near(double value, double expected, double tolerance, const char *what) {
-    if (!(fabs(value - expected) <= tolerance))
-        fail_msg("%s: %.17g, expected %.17g within %g", what, value, expected, tolerance);
-}
 
 // a closed tank of 0.1 m full of water, grains in `box` of it, without weight
 typedef struct basin {

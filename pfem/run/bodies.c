@@ -30,14 +30,6 @@ static void quaternion_times(const double p[4], const double q[4], double out[4]
         out[d + 1] = p[0] * q[d + 1] + q[0] * p[d + 1] + v[d];
 }
 
-static void quaternion_turn(const double q[4], const double x[3], double out[3]) {
-    double t[3], u[3];
-    cross(q + 1, x, t);
-    cross(q + 1, t, u);
-    for (int d = 0; d < 3; d++)
-        out[d] = x[d] + 2 * (q[0] * t[d] + u[d]);
-}
-
 // the turn that takes a to b
 static void quaternion_between(const double a[4], const double b[4], double out[4]) {
     const double back[4] = {a[0], -a[1], -a[2], -a[3]};
@@ -49,7 +41,7 @@ void silt_run_body_turn(const struct silt_body *before, const struct silt_body *
     for (int d = 0; d < dim; d++)
         arm[d] = x[d] - before->x[d];
     quaternion_between(before->q, now->q, turn);
-    quaternion_turn(turn, arm, out);
+    silt_turn(turn, false, arm, out);
     for (int d = 0; d < 3; d++)
         out[d] += now->x[d];
 }
@@ -200,7 +192,7 @@ static void inertia_turned(const struct silt_body *body, double tensor[3][3]) {
     double axis[3][3];
     for (int a = 0; a < 3; a++) {
         const double unit[3] = {a == 0, a == 1, a == 2};
-        quaternion_turn(body->q, unit, axis[a]);
+        silt_turn(body->q, false, unit, axis[a]);
     }
     memset(tensor, 0, 9 * sizeof(double));
     for (int a = 0; a < 3; a++)
@@ -292,12 +284,12 @@ static void block_turned(const double q[4], const double *block, double *out) {
     double half[ROW * ROW], x[3], y[3];
     for (int r = 0; r < ROW; r++)
         for (int h = 0; h < ROW; h += 3)
-            quaternion_turn(q, block + ROW * r + h, half + ROW * r + h);
+            silt_turn(q, false, block + ROW * r + h, half + ROW * r + h);
     for (int c = 0; c < ROW; c++)
         for (int h = 0; h < ROW; h += 3) {
             for (int d = 0; d < 3; d++)
                 x[d] = half[ROW * (h + d) + c];
-            quaternion_turn(q, x, y);
+            silt_turn(q, false, x, y);
             for (int d = 0; d < 3; d++)
                 out[ROW * (h + d) + c] = y[d];
         }
