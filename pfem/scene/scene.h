@@ -331,7 +331,8 @@ typedef struct silt_body_def {
     double density; // kg/m3
     double velocity[3];
     double spin[3]; // rad/s, 3-D, at the start
-    silt_condition condition; // of water on it, WALL_NO_SLIP or WALL_SLIP
+    silt_condition condition; // of water on it
+    double roughness; // m, equivalent sand roughness of the wall law
     silt_motion motion;
     silt_series path;  // MOTION_PRESCRIBED: a path (silt_path_at)
     double path_scale; // 1, factor on the numbers of its file
@@ -500,6 +501,11 @@ static inline int silt_scene_grains(const silt_scene *s) { return s->grains.n_gr
 static inline const silt_grain_def *silt_scene_grain(const silt_scene *s, int i) {
     return i < s->grains.n_grain ? &s->grains.grain[i] : &s->grains.filled[i - s->grains.n_grain];
 }
+
+/** whether water goes with the body's normal only */
+static inline bool silt_body_slips(const silt_body_def *body) { return body->condition != WALL_NO_SLIP; }
+/** whether something in the scene has the law of the wall (scene_settle.c) */
+bool silt_scene_law(const silt_scene *s);
 
 /** what a scene needs */
 static inline bool silt_scene_has_dem(const silt_scene *s) { return s->grains.on || s->n_body > 0; }

@@ -17,7 +17,6 @@ static const silt_word scheme_words[] = {{"implicit", SCHEME_IMPLICIT}, {"fracti
 static const silt_word pressure_words[] = {{"consistent", PRESSURE_CONSISTENT}, {"laplacian", PRESSURE_LAPLACIAN}, {0}};
 static const silt_word condition_words[] = {
     {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
-static const silt_word body_condition_words[] = {{"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {0}};
 static const silt_word wall_condition_words[] = {
     {"default", WALL_DEFAULT}, {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
 static const silt_word flow_words[] = {{"turbulent", FLOW_TURBULENT}, {"laminar", FLOW_LAMINAR}, {0}};
@@ -569,8 +568,11 @@ static const silt_key body_rows[] = {
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_body_def, velocity), .doc = "at the start"},
     {"spin", KEY_POINT, .unit = "rad/s", .flags = KEY_SPACE, .fallback = "[0, 0, 0]", AT(silt_body_def, spin),
      .doc = "angular velocity at the start"},
-    {"condition", KEY_WORD, .fallback = "no-slip", .words = body_condition_words, AT(silt_body_def, condition),
-     .doc = "of the water at its surface; slip: it goes with the surface's normal only, but sticks to edges, at waterlines and in films of one cell; not for bodies that strike walls"},
+    {"condition", KEY_WORD, .fallback = "no-slip", .words = condition_words, AT(silt_body_def, condition),
+     .doc = "of the water at its surface; slip and wall-law: it goes with the surface's normal only, but sticks to edges, at waterlines and in "
+            "films of one cell; not for bodies that strike walls"},
+    {"roughness", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_body_def, roughness),
+     .doc = "equivalent sand roughness of the wall law; 0: smooth"},
     {"motion", KEY_WORD, .fallback = "free", .words = motion_words, AT(silt_body_def, motion),
      .doc = "free to move, held where it is, or moved by `path` whatever acts on it"},
     {"path", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_body_def, path),

@@ -220,6 +220,15 @@ static void settle_wall(silt_reader *reader, const silt_scene *scene, silt_wall 
     free(path);
 }
 
+bool silt_scene_law(const silt_scene *scene) {
+    bool law = scene->bed.on && scene->bed.condition == WALL_LAW;
+    for (int i = 0; i < scene->n_wall; i++)
+        law |= scene->wall[i].condition == WALL_LAW;
+    for (int i = 0; i < scene->n_body; i++)
+        law |= scene->body[i].condition == WALL_LAW;
+    return law;
+}
+
 // bodies -----------------------------------------------------------------------------------------------
 static void settle_body(silt_reader *reader, const silt_scene *scene, silt_body_def *body, int i) {
     char *path = silt_text("bodies.%d", i);
