@@ -435,6 +435,7 @@ void silt_run_free(silt_run *run) {
     free(run->waiting);
     free(run->rest);
     free(run->owed);
+    free(run->pick);
     free(run->freed);
     free(run->freed_area);
     free(run->grown);

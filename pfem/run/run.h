@@ -61,6 +61,8 @@ struct silt_run {
     silt_rest *rest;       // owned, rising id
     int n_owed, owed_capacity;
     double *owed;          // owned, kg, one per inlet: what has come due and is less than a parcel; none where nothing is fed
+    int pick_capacity;
+    int *pick;             // owned, bed nodes that leave together
     int n_freed, freed_capacity;
     int (*freed)[4];       // owned, bed nodes of cells released in this step
     int freed_area_capacity;
