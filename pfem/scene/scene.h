@@ -446,6 +446,10 @@ struct silt_scene {
         int64_t steps;         // most steps, 0: no limit
         int retries;           // how often a failed step is halved
     } time;
+    struct {
+        bool on;                     // the block was there; the numbers always are
+        double volume, mass, energy; // shares that a run may be off by before it says so (silt_bounds)
+    } bounds;
     double gravity[3];
     silt_fluid_def fluid;
     int n_wall;
@@ -499,6 +503,14 @@ int silt_sieve_draw(const silt_series *sieve, uint64_t seed, double whole, doubl
 static inline int silt_scene_grains(const silt_scene *s) { return s->grains.n_grain + s->grains.n_filled; }
 static inline const silt_grain_def *silt_scene_grain(const silt_scene *s, int i) {
     return i < s->grains.n_grain ? &s->grains.grain[i] : &s->grains.filled[i - s->grains.n_grain];
+}
+
+/** how many of its bodies move */
+static inline int silt_scene_moves(const silt_scene *s) {
+    int n = 0;
+    for (int i = 0; i < s->n_body; i++)
+        n += s->body[i].motion != MOTION_FIXED;
+    return n;
 }
 
 /** what a scene needs */
