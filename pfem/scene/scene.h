@@ -447,6 +447,10 @@ struct silt_scene {
         int64_t steps;         // most steps, 0: no limit
         int retries;           // how often a failed step is halved
     } time;
+    struct {
+        bool on;                     // the block was there; the numbers always are
+        double volume, mass, energy; // shares that a run may be off by before it says so (silt_bounds)
+    } bounds;
     double gravity[3];
     silt_fluid_def fluid;
     int n_wall;
@@ -506,6 +510,13 @@ static inline const silt_grain_def *silt_scene_grain(const silt_scene *s, int i)
 static inline bool silt_body_slips(const silt_body_def *body) { return body->condition != WALL_NO_SLIP; }
 /** whether something in the scene has the law of the wall (scene_settle.c) */
 bool silt_scene_law(const silt_scene *s);
+/** how many of its bodies move */
+static inline int silt_scene_moves(const silt_scene *s) {
+    int n = 0;
+    for (int i = 0; i < s->n_body; i++)
+        n += s->body[i].motion != MOTION_FIXED;
+    return n;
+}
 
 /** what a scene needs */
 static inline bool silt_scene_has_dem(const silt_scene *s) { return s->grains.on || s->n_body > 0; }

@@ -111,6 +111,16 @@ static const silt_key time_rows[] = {
     {0}};
 TABLE(time, "the time block", silt_scene, -1);
 
+static const silt_key bounds_rows[] = {
+    {"volume", KEY_NUMBER, .fallback = BOUNDS_VOLUME, POSITIVE, AT(silt_scene, bounds.volume),
+     .doc = "largest `volume_error` of the water, what is owed included"},
+    {"mass", KEY_NUMBER, .fallback = BOUNDS_MASS, POSITIVE, AT(silt_scene, bounds.mass),
+     .doc = "the same without what is owed: water that is really lost or gained, as a share of start and inflow"},
+    {"energy", KEY_NUMBER, .fallback = BOUNDS_ENERGY, POSITIVE, AT(silt_scene, bounds.energy),
+     .doc = "largest energy of water, grains and bodies above that of the start and the work from outside, as a share of what could move"},
+    {0}};
+TABLE(bounds, "the bounds block", silt_scene, -1);
+
 // regions stand in lists of their own, and in the items of fluid.sizes
 #define REGION_ROWS(type, at)                                                                                          \
     {"box",                                                                                                            \
@@ -718,6 +728,8 @@ static const silt_key scene_rows[] = {
     {"periodic", KEY_PAIR, .unit = "m", .flags = KEY_OPTIONAL, AT(silt_scene, period),
      .doc = "the scene repeats in x: what leaves at one end enters at the other"},
     {"time", KEY_BLOCK, .sub = &time_table, .doc = "how long, how often, how fine"},
+    {"bounds", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &bounds_table, .presence = PRESENT_FLAG, .present = offsetof(silt_scene, bounds.on),
+     .doc = "how far the run's ledgers may be off before the run warns of it at its end and `silt verify` fails"},
     {"gravity", KEY_POINT, .unit = "m/s2", AT(silt_scene, gravity),
      .doc = "acceleration, for example [0, -9.81], in 3-D [0, 0, -9.81]"},
     {"fluid", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &fluid_table, .presence = PRESENT_FLAG,
