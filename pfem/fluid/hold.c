@@ -215,19 +215,17 @@ void silt_hold_replace(const silt_fluid *f, int i, const double *own, double *v)
         v[d] = f->hold[i] == HOLD_ALL ? held[d] : v[d] + (held[d] - loose[d]);
 }
 
-// normal of a facet that moves evenly, mean over the step: the continuity of a cell in space asks for that one, in the plane it is
-// that of the midpoint
-static void facet_mean_normal(const silt_fluid *f, const silt_step *s, const double *x_mid, const int *facet, double n[3]) {
-    facet_normal(s->mesh, x_mid, facet, n);
-    if (f->dim != 3 || x_mid == s->nodes->x)
+void silt_facet_mean_normal(const silt_mesh *mesh, const double *x, const double *x_mid, const int *facet, double n[3]) {
+    facet_normal(mesh, x_mid, facet, n);
+    if (mesh->dim != 3 || x_mid == x)
         return;
     double end[9], first[3], last[3];
     const int own[3] = {0, 1, 2};
     for (int c = 0; c < 3; c++)
         for (int d = 0; d < 3; d++)
-            end[3 * c + d] = 2 * x_mid[3 * facet[c] + d] - s->nodes->x[3 * facet[c] + d];
-    facet_normal(s->mesh, s->nodes->x, facet, first);
-    facet_normal(s->mesh, end, own, last);
+            end[3 * c + d] = 2 * x_mid[3 * facet[c] + d] - x[3 * facet[c] + d];
+    facet_normal(mesh, x, facet, first);
+    facet_normal(mesh, end, own, last);
     for (int d = 0; d < 3; d++)
         n[d] = (first[d] + 4 * n[d] + last[d]) / 6;
 }
@@ -256,7 +254,7 @@ static void body_normals(silt_fluid *f, const silt_step *s, const double *x_mid)
         if (mesh->facet_kind[k] != FACET_BODY || !silt_hold_slips(s, facet[0]))
             continue;
         double n[3];
-        facet_mean_normal(f, s, x_mid, facet, n);
+        silt_facet_mean_normal(mesh, s->nodes->x, x_mid, facet, n);
         for (int c = 0; c < D; c++) {
             const int i = facet[c];
             if (!body_loose(f, s, i))
