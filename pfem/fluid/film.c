@@ -6,6 +6,9 @@
 
 void silt_film_clear(silt_film *m) {
     free(m->mouth);
+    free(m->slave);
+    free(m->slave_body);
+    free(m->way);
     free(m->node);
     free(m->rim);
     free(m->element);
@@ -38,6 +41,7 @@ static void face_stiffness(const silt_mesh *mesh, const double *x, const int *co
 void silt_film_ready(silt_film *m, const silt_mesh *mesh, const double *x) {
     const int D = mesh->dim;
     SILT_RESERVE(m->mouth_normal, m->mouth_room, m->n_mouth + 1);
+    SILT_RESERVE(m->way, m->way_room, m->n_slave + 1);
     SILT_RESERVE(m->normal, m->normal_room, m->n_element + 1);
     SILT_RESERVE(m->stiffness, m->stiffness_room, m->n_element + 1);
     SILT_RESERVE(m->work, m->work_room, 7 * m->n_node + 1);
@@ -209,6 +213,13 @@ void silt_film_continuity(const silt_film *m, const silt_mesh *mesh, const uint8
     for (int a = 0; a < m->n_node; a++)
         if (m->rim[a] == FILM_WET)
             *(passes_on(mesh, mobile, m->node[a]) ? residual + m->node[a] : withheld + m->node[a]) -= m->squeezed[a];
+}
+
+void silt_film_free_part(const silt_film *m, int k, int D, double *v) {
+    const struct silt_film_way *way = &m->way[k];
+    const double along = silt_dot(D, v, way->vector);
+    for (int d = 0; d < D; d++)
+        v[d] = way->hold == HOLD_NORMAL ? v[d] - along * way->vector[d] : way->hold == HOLD_LINE ? along * way->vector[d] : 0;
 }
 
 void silt_film_push(const silt_film *m, const silt_mesh *mesh, const double *p, double *out) {

@@ -1,7 +1,8 @@
 /** @file film.h
  * Water too thin for cells, between a body and something solid. Its pressure is that of the water at its rim, extended over the
  * body's surface without sources (Laplace), which in the plane is a line from end to end. What the body's motion squeezes out of it leaves
- * through the rim by the same weights: forces and volume are each other's adjoints, so the film does no work of its own.
+ * through the rim by the same weights: forces and volume are each other's adjoints, so the film does no work of its own. At a mouth, where
+ * the water's mesh ends at a film, nothing passes by itself and no node slides: what of the film a facet there sweeps changes hands.
  */
 #ifndef SILT_FILM_H
 #define SILT_FILM_H
@@ -14,6 +15,9 @@ typedef struct silt_film {
     // found before a step
     int n_mouth, mouth_capacity;
     int *mouth;              // owned, facets of the water's mesh that end at a film, which presses back on them
+    int n_slave, slave_capacity, slave_body_capacity;
+    int *slave;              // owned, nodes of the water at mouths that may slide along a wall: they go with the body instead
+    int *slave_body;         // owned, the body
     int n_node, node_capacity, rim_capacity;
     int *node;               // owned, nodes of bodies under films
     uint8_t *rim;            // owned, film_rim
@@ -28,7 +32,11 @@ typedef struct silt_film {
     double *place;             // owned, 2 dim per node, m: where the nodes are, and half way through the step
     double *work;              // owned, seven per node: the solver's
     double *squeezed;          // owned, per node: m3/s that come into the water at it; nought where it is no rim
-    int squeezed_room, place_room;
+    int squeezed_room, place_room, way_room;
+    struct silt_film_way {
+        uint8_t hold;          // silt_hold of the wall alone
+        double vector[3], given[3];
+    } *way;                    // owned, per slave: how walls hold it
 } silt_film;
 
 struct silt_step;
@@ -51,5 +59,7 @@ void silt_film_continuity(const silt_film *film, const silt_mesh *mesh, const ui
 void silt_film_push(const silt_film *film, const silt_mesh *mesh, const double *p, double *out);
 /** force of the bodies' nodes on the film: out += int N p n */
 void silt_film_press(silt_film *film, int dim, const double *p, double *out);
+/** the part of a vector at slave k along which the wall leaves it free */
+void silt_film_free_part(const silt_film *film, int k, int dim, double *v);
 
 #endif

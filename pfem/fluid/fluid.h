@@ -29,7 +29,7 @@ typedef struct silt_step {
     silt_seep *seep;             // prepared for this step; NULL where the bed lets no water through
     silt_nodes *nodes;
     double time, dt;             // s, start and length
-    // dim per node, m/s, of nodes on bodies: velocity of the momentum, and what carries their places beside it; NULL: the nodes' own, none
+    // dim per node, m/s, of nodes on bodies and of slaves of films: velocity of the momentum, and what carries their places beside it; NULL: the nodes' own, none
     const double *body_velocity, *body_shift;
     const double *body_start; // dim per node, m/s, of nodes on bodies where water slips: the body's velocity as the step begins; NULL: none
     silt_film *film;         // found for this step; NULL: no body is so near to anything

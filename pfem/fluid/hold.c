@@ -365,6 +365,27 @@ static void hold_bodies(silt_fluid *f, const silt_step *s) {
     body_normals(f, s, s->nodes->x);
 }
 
+// Nodes at the mouths of films go along walls as the body does. @param fresh  what holds them was found anew for all; else on bent walls
+static void hold_slaves(silt_fluid *f, const silt_step *s, bool fresh) {
+    const int D = f->dim;
+    for (int k = 0; f->film && k < f->film->n_slave; k++) {
+        const int i = f->film->slave[k];
+        struct silt_film_way *way = &f->film->way[k];
+        if (fresh || f->hold[i] != HOLD_ALL) {
+            way->hold = f->hold[i];
+            memcpy(way->vector, f->normal + D * i, (size_t)D * sizeof(double));
+            memcpy(way->given, f->given + D * i, (size_t)D * sizeof(double));
+        }
+        double v[3] = {0};
+        if (s->body_velocity)
+            memcpy(v, s->body_velocity + D * i, (size_t)D * sizeof(double));
+        silt_film_free_part(f->film, k, D, v);
+        f->hold[i] = HOLD_ALL;
+        for (int d = 0; d < D; d++)
+            f->given[D * i + d] = way->given[d] + v[d];
+    }
+}
+
 void silt_hold_bodies_again(silt_fluid *f, const silt_step *s) {
     const int D = f->dim;
     for (int i = 0; i < f->n_node; i++) {
@@ -376,6 +397,9 @@ void silt_hold_bodies_again(silt_fluid *f, const silt_step *s) {
         else
             memset(f->w + D * i, 0, (size_t)D * sizeof(double));
     }
+    hold_slaves(f, s, false);
+    for (int k = 0; f->film && k < f->film->n_slave; k++)
+        memcpy(f->w + D * f->film->slave[k], f->given + D * f->film->slave[k], (size_t)D * sizeof(double));
     if (!f->ride)
         return;
     body_ride(f, s);
@@ -397,6 +421,7 @@ void silt_hold_bent(silt_fluid *f, const silt_step *s) {
         memcpy(f->normal + D * i, vector, (size_t)D * sizeof(double));
         memcpy(f->given + D * i, given, (size_t)D * sizeof(double));
     }
+    hold_slaves(f, s, false);
 }
 
 void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
@@ -431,4 +456,5 @@ void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
         hold_bed_rest(f, s);
     }
     hold_bodies(f, s);
+    hold_slaves(f, s, true);
 }

@@ -79,6 +79,23 @@ static struct silt_body coasting(const struct silt_body *body, double dt) {
 
 /** Velocities of the nodes on a body that goes from one pose and velocity to another: that of the step's momentum, theta of the way from
  * the first velocity to the second, about the place half way; and what carries the nodes beside it to where they come. */
+static void rigid_motion(const silt_run *run, int i, const struct silt_body *a, const struct silt_body *b, double theta, double *v, double *shift) {
+    const int D = silt_nodes_dim(&run->nodes);
+    const double *x = run->nodes.x + D * i;
+    double end[3], arm[3] = {0}, spin[3], turning[3];
+    silt_run_body_turn(a, b, x, D, end);
+    for (int d = 0; d < D; d++)
+        arm[d] = 0.5 * (x[d] - a->x[d] + end[d] - b->x[d]);
+    for (int d = 0; d < 3; d++)
+        spin[d] = a->w[d] + theta * (b->w[d] - a->w[d]);
+    cross(spin, arm, turning);
+    for (int d = 0; d < D; d++) {
+        v[d] = a->v[d] + theta * (b->v[d] - a->v[d]) + turning[d];
+        shift[d] = (end[d] - x[d]) / run->dt - v[d];
+    }
+}
+
+// Slaves of films have the velocity alone: walls, which they stay on, carry their places.
 static void node_motion(silt_run *run, const struct silt_body *before, const struct silt_body *now, double theta) {
     const silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
@@ -87,19 +104,12 @@ static void node_motion(silt_run *run, const struct silt_body *before, const str
     for (int i = 0; i < nodes->count; i++) {
         if (nodes->kind[i] != NODE_BODY)
             continue;
-        const struct silt_body *a = &before[nodes->owner[i]], *b = &now[nodes->owner[i]];
-        double end[3], arm[3] = {0}, spin[3], turning[3];
-        silt_run_body_turn(a, b, nodes->x + D * i, D, end);
-        for (int d = 0; d < D; d++)
-            arm[d] = 0.5 * (nodes->x[D * i + d] - a->x[d] + end[d] - b->x[d]);
-        for (int d = 0; d < 3; d++)
-            spin[d] = a->w[d] + theta * (b->w[d] - a->w[d]);
-        cross(spin, arm, turning);
-        for (int d = 0; d < D; d++) {
-            const double v = a->v[d] + theta * (b->v[d] - a->v[d]) + turning[d];
-            run->body_velocity[D * i + d] = v;
-            run->body_shift[D * i + d] = (end[d] - nodes->x[D * i + d]) / run->dt - v;
-        }
+        const int own = nodes->owner[i];
+        rigid_motion(run, i, &before[own], &now[own], theta, run->body_velocity + D * i, run->body_shift + D * i);
+    }
+    for (int k = 0; run->film && k < run->film->n_slave; k++) {
+        const int i = run->film->slave[k], own = run->film->slave_body[k];
+        rigid_motion(run, i, &before[own], &now[own], theta, run->body_velocity + D * i, run->body_shift + D * i);
     }
 }
 
@@ -112,13 +122,13 @@ void silt_run_bodies_coast(silt_run *run) {
         run->body_before[b] = bodies->body[b];
         run->body_after[b] = coasting(&bodies->body[b], run->dt);
     }
-    node_motion(run, run->body_before, run->body_after, 1);
     run->film = silt_uplift_find(&run->uplift, run);
+    node_motion(run, run->body_before, run->body_after, 1);
 }
 
-// from body b's place half way through the step to its node's then; those under films are none of the water's mesh
-static void node_arm(const silt_run *run, int i, double arm[3]) {
-    const int D = silt_nodes_dim(&run->nodes), b = run->nodes.owner[i];
+// from body b's place half way through the step to a node's then; those under films are none of the water's mesh
+static void node_arm(const silt_run *run, int b, int i, double arm[3]) {
+    const int D = silt_nodes_dim(&run->nodes);
     arm[2] = 0;
     for (int d = 0; d < D; d++) {
         const int k = D * i + d;
@@ -127,25 +137,60 @@ static void node_arm(const silt_run *run, int i, double arm[3]) {
     }
 }
 
-// force and torque of the nodes' `push` on every body, about its place half way through the step; ROW per body. @param sign  of it
-static void sum_bodies(const silt_run *run, const double *push, double sign, double *out) {
+// a force on body b at its node, or its slave, i
+static void force_add(const silt_run *run, int b, int i, const double force[3], double *out) {
+    double arm[3], torque[3];
+    node_arm(run, b, i, arm);
+    cross(arm, force, torque);
+    for (int d = 0; d < 3; d++) {
+        out[ROW * b + d] += force[d];
+        out[ROW * b + 3 + d] += torque[d];
+    }
+}
+
+/** Force and torque of the water on every body, about its place half way through the step; ROW per body. Slaves give it what walls do not
+ * take. */
+static void sum_bodies(const silt_run *run, double *out) {
     const silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
+    const double *reaction = run->fluid.reaction;
     memset(out, 0, (size_t)(ROW * run->n_body_before) * sizeof(double));
     for (int i = 0; i < run->fluid.n_node; i++) {
-        if (nodes->kind[i] != NODE_BODY)
-            continue;
-        const int b = nodes->owner[i];
-        double arm[3], force[3] = {0}, torque[3];
-        node_arm(run, i, arm);
+        double force[3] = {0};
         for (int d = 0; d < D; d++)
-            force[d] = sign * push[D * i + d];
-        cross(arm, force, torque);
-        for (int d = 0; d < 3; d++) {
-            out[ROW * b + d] += force[d];
-            out[ROW * b + 3 + d] += torque[d];
-        }
+            force[d] = -reaction[D * i + d];
+        if (nodes->kind[i] == NODE_BODY)
+            force_add(run, nodes->owner[i], i, force, out);
     }
+    for (int k = 0; run->film && k < run->film->n_slave; k++) {
+        double force[3] = {0};
+        for (int d = 0; d < D; d++)
+            force[d] = -reaction[D * run->film->slave[k] + d];
+        silt_film_free_part(run->film, k, D, force);
+        force_add(run, run->film->slave_body[k], run->film->slave[k], force, out);
+    }
+}
+
+// what slaves gave to bodies is none of the walls'
+static void slaves_settle(silt_run *run) {
+    const int D = silt_nodes_dim(&run->nodes);
+    for (int k = 0; run->film && k < run->film->n_slave; k++) {
+        double *own = run->fluid.reaction + D * run->film->slave[k], part[3];
+        memcpy(part, own, (size_t)D * sizeof(double));
+        silt_film_free_part(run->film, k, D, part);
+        for (int d = 0; d < D; d++)
+            own[d] -= part[d];
+    }
+}
+
+// velocity at a node of a body, or its slave, for a unit of one of the body's modes
+static void mode_at(const silt_run *run, int b, int mode, int i, double v[3]) {
+    double axis[3] = {0}, arm[3];
+    axis[mode % 3] = 1;
+    node_arm(run, b, i, arm);
+    cross(axis, arm, v);
+    if (mode < 3)
+        memcpy(v, axis, sizeof axis);
 }
 
 // velocity of the nodes on body b for a unit of one of its modes; @return false: it is dry
@@ -158,18 +203,24 @@ static bool mode_motion(const silt_run *run, int b, int mode, double *motion) {
         if (nodes->kind[i] != NODE_BODY || nodes->owner[i] != b)
             continue;
         wet |= run->mesh.wet[i];
-        double axis[3] = {0}, arm[3], v[3];
-        axis[mode % 3] = 1;
-        node_arm(run, i, arm);
-        cross(axis, arm, v);
-        for (int d = 0; d < D; d++)
-            motion[D * i + d] = v[d] = mode < 3 ? axis[d] : v[d];
+        double v[3];
+        mode_at(run, b, mode, i, v);
+        memcpy(motion + D * i, v, (size_t)D * sizeof(double));
         if (!run->mesh.wet[i])
             continue;
         // along a surface where it slips the water does what it does
         silt_hold_project(&run->fluid, i, v);
         for (int d = 0; d < D; d++)
             motion[D * i + d] -= v[d];
+    }
+    for (int k = 0; run->film && k < run->film->n_slave; k++) {
+        const int i = run->film->slave[k];
+        double v[3];
+        if (run->film->slave_body[k] != b)
+            continue;
+        mode_at(run, b, mode, i, v);
+        silt_film_free_part(run->film, k, D, v);
+        memcpy(motion + D * i, v, (size_t)D * sizeof(double));
     }
     return wet;
 }
@@ -514,13 +565,14 @@ done:
 silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_error *err) {
     SILT_RESERVE(run->body_carry, run->body_carry_capacity, run->n_body_before + 1);
     double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force);
-    sum_bodies(run, run->fluid.reaction, -1, force);
+    sum_bodies(run, force);
     if (!silt_run_bodies_free(run)) {
         silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
         for (int b = 0; b < bodies->count; b++) {
             memcpy(bodies->body[b].force, force + ROW * b, sizeof bodies->body[b].force);
             memcpy(bodies->body[b].torque, force + ROW * b + 3, sizeof bodies->body[b].torque);
         }
+        slaves_settle(run);
         free(force);
         return SILT_OK;
     }
@@ -605,7 +657,8 @@ silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_er
     held_end(&held);
     SILT_TRY(status);
     double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force);
-    sum_bodies(run, run->fluid.reaction, -1, force);
+    sum_bodies(run, force);
+    slaves_settle(run);
     run->body_error = 0;
     for (int b = 0; b < run->n_body_before; b++) {
         struct silt_body *body = &bodies->body[b];

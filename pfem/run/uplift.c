@@ -7,6 +7,7 @@
 #include "wall.h"
 
 #define UPLIFT_SHUT 0.02 // of the local size: a mouth that is narrower lets no air through
+#define SLAVE (-3)       // in `place`: a node that has been listed
 #define UPLIFT_GAP 0.5   // of it: what is nearer to something solid has no air between
 
 /** what is behind a piece of a body's surface */
@@ -20,8 +21,11 @@ struct silt_uplift {
     int group_capacity, place_capacity, first_capacity, list_capacity, at_capacity, open_capacity, closed_capacity;
     int *group;       // owned, per node: nodes of one film are a group; -1: of none
     uint8_t *open;    // owned, per group: air comes to it
-    int *place;       // owned, per node: in film.node, -1
+    int *place;       // owned, per node: in film.node, -1; then whatever is asked
     uint8_t *closed;  // owned, per facet of the water: a film presses back on it
+    int parent_capacity, sealed_capacity;
+    int *parent;      // owned, per node: pieces of water (silt_group_find)
+    uint8_t *sealed;  // owned, per piece: 1 films are all that it has besides what is shut, 2: and it stays so
     int *at;          // owned, node of each number that bodies' nodes were given, -1
     int *first, *list; // owned, pieces by their nodes
 };
@@ -37,6 +41,8 @@ void silt_uplift_free(silt_uplift **uplift) {
     free(u->open);
     free(u->place);
     free(u->closed);
+    free(u->parent);
+    free(u->sealed);
     free(u->at);
     free(u->first);
     free(u->list);
@@ -356,27 +362,90 @@ static void films_group(silt_uplift *u, const silt_run *run) {
                 u->open[group_of(u, mesh->facet[f][a])] = 1;
 }
 
+// Pieces of water that nothing but mouths opens. One that has all the rims of its films is closed indeed, a full tank; a puddle under a body
+// is not: its film goes on to air or to other water.
+static void pieces_seal(silt_uplift *u, const silt_run *run) {
+    const silt_mesh *mesh = &run->mesh;
+    const silt_nodes *nodes = &run->nodes;
+    SILT_RESERVE(u->parent, u->parent_capacity, nodes->count + 1);
+    SILT_RESERVE(u->sealed, u->sealed_capacity, nodes->count + 1);
+    for (int i = 0; i < nodes->count; i++)
+        u->parent[i] = i;
+    for (int e = 0; e < mesh->n_cell; e++)
+        silt_group_join(u->parent, mesh->cell[e]);
+    for (int i = 0; i < nodes->count; i++)
+        u->sealed[i] = 1;
+    for (int f = 0; f < mesh->n_facet; f++)
+        if ((mesh->facet_kind[f] == FACET_FREE && !u->closed[f]) || mesh->facet_kind[f] == FACET_OPEN)
+            u->sealed[silt_group_find(u->parent, mesh->facet[f][0])] = 0;
+    // one piece for each film, or they are not closed: u->place is not used any more
+    int *piece = u->place;
+    for (int i = 0; i < nodes->count; i++)
+        piece[i] = -1;
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < nodes->count; i++) {
+            if (u->group[i] < 0 || !mesh->wet[i])
+                continue;
+            const int g = group_of(u, i), own = silt_group_find(u->parent, i);
+            if (pass == 0)
+                piece[g] = piece[g] < 0 || piece[g] == own ? own : -2;
+            else if (u->sealed[own] && (u->open[g] || piece[g] == -2))
+                u->sealed[own] = 2;
+        }
+    for (int f = 0; f < mesh->n_facet; f++)
+        if (u->closed[f] && u->sealed[silt_group_find(u->parent, mesh->facet[f][0])] == 2)
+            u->closed[f] = 0;
+    // where it touches a body the film goes by, as if it were not there
+    for (int k = 0; k < u->film.n_node; k++) {
+        const int i = u->film.node[k];
+        if (u->film.rim[k] == FILM_WET && u->sealed[silt_group_find(u->parent, i)] == 2)
+            u->film.rim[k] = FILM_INNER;
+    }
+}
+
+// a node of a mouth that slides along a wall goes with the body, of several with the first that asks
+static void slave_add(silt_uplift *u, const silt_run *run, const int *facet, int a) {
+    silt_film *m = &u->film;
+    const int i = facet[a];
+    if (run->nodes.kind[i] != NODE_FLUID || u->place[i] == SLAVE)
+        return;
+    int body = -1;
+    for (int c = 0; c < run->mesh.dim && body < 0; c++)
+        body = run->nodes.kind[facet[c]] == NODE_BODY ? run->nodes.owner[facet[c]] : -1;
+    u->place[i] = SLAVE;
+    SILT_RESERVE(m->slave, m->slave_capacity, m->n_slave + 1);
+    SILT_RESERVE(m->slave_body, m->slave_body_capacity, m->n_slave + 1);
+    m->slave[m->n_slave] = i;
+    m->slave_body[m->n_slave++] = body;
+}
+
 // Which mouths are shut: all of a film that air does not come to, else those that are narrow. Their nodes are no free surface.
 static void mouths_shut(silt_uplift *u, silt_run *run) {
     silt_mesh *mesh = &run->mesh;
     silt_film *m = &u->film;
     const int D = mesh->dim;
+    bool any = false;
     for (int f = 0; f < mesh->n_facet; f++) {
-        bool shut = u->closed[f];
-        for (int a = 0; a < D && shut; a++) {
+        for (int a = 0; a < D && u->closed[f]; a++) {
             const int i = mesh->facet[f][a];
             if (run->nodes.kind[i] == NODE_BODY)
-                shut = !u->open[group_of(u, i)] || near_solid(run, i, UPLIFT_SHUT);
+                u->closed[f] = !u->open[group_of(u, i)] || near_solid(run, i, UPLIFT_SHUT);
         }
-        u->closed[f] = shut;
-        for (int a = 0; a < D && shut; a++)
+        any |= u->closed[f];
+    }
+    if (any)
+        pieces_seal(u, run);
+    for (int f = 0; f < mesh->n_facet && any; f++) {
+        for (int a = 0; a < D && u->closed[f]; a++)
             mesh->surface[mesh->facet[f][a]] = 0;
-        if (shut) {
+        for (int a = 0; a < D && u->closed[f]; a++)
+            slave_add(u, run, mesh->facet[f], a);
+        if (u->closed[f]) {
             SILT_RESERVE(m->mouth, m->mouth_capacity, m->n_mouth + 1);
             m->mouth[m->n_mouth++] = f;
         }
     }
-    for (int f = 0; f < mesh->n_facet && m->n_mouth; f++)
+    for (int f = 0; f < mesh->n_facet && any; f++)
         for (int a = 0; a < D && mesh->facet_kind[f] == FACET_FREE && !u->closed[f]; a++)
             mesh->surface[mesh->facet[f][a]] = 1;
 }
@@ -393,7 +462,7 @@ silt_film *silt_uplift_find(silt_uplift **uplift, silt_run *run) {
     silt_uplift *u = *uplift;
     const silt_nodes *nodes = &run->nodes;
     silt_film *m = &u->film;
-    m->n_node = m->n_element = m->n_mouth = 0;
+    m->n_node = m->n_element = m->n_mouth = m->n_slave = 0;
     if (!run->mesh.n_cell)
         return NULL;
     SILT_RESERVE(u->group, u->group_capacity, nodes->count + 1);
