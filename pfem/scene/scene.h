@@ -37,7 +37,7 @@ typedef enum {
     WALL_NO_SLIP = 0,
     WALL_SLIP,
     WALL_LAW, // slip with the traction of the logarithmic law of the wall
-    WALL_DEFAULT, // wall law where the flow is turbulent, no-slip where it is laminar; replaced while reading
+    WALL_DEFAULT, // wall law where the flow is turbulent, no-slip where it is laminar, on bodies slip where cells are too coarse for it; replaced while reading
 } silt_condition;
 /** how a wall is given; a 2-D box becomes a closed polyline while reading */
 typedef enum { WALL_POLYLINE = 1, WALL_BOX, WALL_SURFACE } silt_wall_form;

@@ -578,9 +578,10 @@ static const silt_key body_rows[] = {
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_body_def, velocity), .doc = "at the start"},
     {"spin", KEY_POINT, .unit = "rad/s", .flags = KEY_SPACE, .fallback = "[0, 0, 0]", AT(silt_body_def, spin),
      .doc = "angular velocity at the start"},
-    {"condition", KEY_WORD, .fallback = "no-slip", .words = condition_words, AT(silt_body_def, condition),
-     .doc = "of the water at its surface; slip and wall-law: it goes with the surface's normal only, but sticks to edges, at waterlines and in "
-            "films of one cell; not for bodies that strike walls"},
+    {"condition", KEY_WORD, .fallback = "default", .words = wall_condition_words, AT(silt_body_def, condition),
+     .doc = "of the water at its surface. slip and wall-law: it goes with the surface's normal only, but sticks to edges, at waterlines and in "
+            "films of one cell. default: wall-law where fluid.flow is turbulent; where it is laminar no-slip if cells show the layer that sticks, "
+            "viscosity/density sqrt(10 h/g) > h^2 with the least size h near bodies, else slip"},
     {"roughness", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_body_def, roughness),
      .doc = "equivalent sand roughness of the wall law; 0: smooth"},
     {"motion", KEY_WORD, .fallback = "free", .words = motion_words, AT(silt_body_def, motion),
