@@ -369,6 +369,7 @@ typedef enum {
     GAUGE_GRAIN_FORCE,    // grain_force: K: of its contacts
     GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
+    GAUGE_BED_LOWEST, // bed_lowest: [x0, x1]: the lowest place of the bed's surface from x0 = from[0] to x1 = from[1]
 } silt_gauge_kind;
 typedef struct silt_gauge_def {
     char *name; // column name(s) in history.csv
