@@ -327,7 +327,8 @@ static silt_status impedance_column(silt_run *run, const silt_step *step, silt_i
     SILT_TRY(silt_fluid_mode(&run->fluid, step, room->motion, 0, mode, err));
     for (int m = 0; m < room->n_mode; m++) {
         const int other = room->row[m];
-        z->water[other * z->size + row] = z->water[row * z->size + other] = per_acceleration * silt_mode_work(&run->fluid, &room->mode[m], mode);
+        z->water[other * z->size + row] = per_acceleration * silt_mode_work(&run->fluid, &room->mode[m], mode);
+        z->water[row * z->size + other] = per_acceleration * silt_mode_work(&run->fluid, mode, &room->mode[m]);
     }
     return SILT_OK;
 }
@@ -495,6 +496,16 @@ static silt_status impedance_sane(const silt_run *run, const silt_impedance *z, 
                              f[0], f[1], f[2], f[3], f[4], f[5], scene->body[z->body[k]].name, body->x[0], body->x[1], way / scene->fluid.size);
     }
     return SILT_OK;
+}
+
+silt_status silt_run_bodies_inertia(silt_run *run, const silt_step *step, int *size, double **inertia, silt_error *err) {
+    silt_impedance z = impedance_begin(run);
+    const silt_status status = impedance_solve(run, step, &z, err);
+    *size = z.size;
+    *inertia = z.water;
+    z.water = NULL;
+    impedance_clear(&z);
+    return status;
 }
 
 // B and R of the step from the force on bodies that go on as they do
