@@ -256,14 +256,20 @@ void silt_pressure_forget(silt_pressure *pressure);
 
 
 // impedance.c ---------------------------------------------------------------------------------------------
+/** one mode of motion of what holds the water */
+typedef struct silt_mode {
+    double *motion, *force; // owned, dim per node: the motion, and what of inertia and viscosity holds it
+    double *load, *p, *left; // owned, per node: what continuity lacks without a pressure; the pressure; what it lacks with it
+    int directions;         // that p took
+} silt_mode;
 /** What the step that was just solved answers to a change of the velocity of bodies' nodes: motion, dim per node, also of those under
- * films, nought where nothing changes. Linear: the matrix of the step's end, whose momentum and continuity are solved for it. w, dim per node,
- * and pressure, 1 per node: change of velocity and pressure. Takes fluid->reaction as working space, and leaves the film's squeeze. */
-silt_status silt_fluid_mode(silt_fluid *fluid, const silt_step *step, const double *motion, double *w, double *pressure, silt_error *err);
-/** The operators of such a change: force, dim per node, of inertia and viscosity at w; rate, 1 per node, of the smoothing at p. With a
- * second mode's w' and p' the sum w'.force + p'.rate is the work of the first one's forces on the second one's motion: symmetric, and never
- * negative for w' = w, however far the modes were solved. */
-void silt_fluid_mode_answer(silt_fluid *fluid, const silt_step *step, const double *w, const double *p, double *force, double *rate);
+ * films, nought where nothing changes. Linear: the matrix of the step's end. Takes fluid->reaction as working space, and the film has no squeeze
+ * then.  @param enough  of the residual at the start, at which the pressure is enough; 0: the usual */
+silt_status silt_fluid_mode(silt_fluid *fluid, const silt_step *step, const double *motion, double enough, silt_mode *mode, silt_error *err);
+/** Work of the forces of mode b on the motion of mode a, N m/s per (m/s)^2: with A the operator of the velocity and K that of the pressure,
+ * a A b + (K p_a).p_b and what is left of both, an error of second order. Symmetric but for rounding. */
+double silt_mode_work(const silt_fluid *fluid, const silt_mode *a, const silt_mode *b);
+void silt_mode_clear(silt_mode *mode);
 
 // fluid.c
 /** v += P G q/inertia */

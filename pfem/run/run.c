@@ -118,7 +118,7 @@ static void water_restore(silt_run *run) {
     silt_stiff_forget(run->fluid.stiff);
 }
 
-static silt_step water_see(silt_run *run) {
+silt_step silt_run_see(silt_run *run) {
     const silt_scene *scene = run->scene;
     silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
                       .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
@@ -161,7 +161,7 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
         if (scene->n_body)
             silt_run_bodies_coast(run);
-        const silt_step step = water_see(run);
+        const silt_step step = silt_run_see(run);
         silt_clock_to(CLOCK_assemble);
         status = silt_fluid_step(&run->fluid, &step, err);
         silt_clock_to(CLOCK_rest);
@@ -309,7 +309,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         });
         const bool moved = status == SILT_OK;
         if (moved && scene->fluid.on && silt_run_bodies_free(run)) {
-            const silt_step step = water_see(run);
+            const silt_step step = silt_run_see(run);
             silt_clock_to(CLOCK_assemble);
             status = silt_run_bodies_answer(run, &step, err);
             silt_clock_to(CLOCK_rest);

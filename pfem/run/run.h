@@ -129,6 +129,8 @@ struct silt_run {
 silt_status silt_run_open(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock, silt_error *err);
 
 // run.c, besides silt_run_advance: clocks are there to be read until its next call --------------------
+/** the step as the water sees it */
+silt_step silt_run_see(silt_run *run);
 /** what output sees of the run */
 void silt_run_view(silt_run *run, silt_view *view);
 /** porosity, ledger and pressure of a state, for row and frame */
@@ -157,6 +159,9 @@ void silt_run_bodies_coast(silt_run *run);
 /** After it, before the discrete elements move: the water's force on bodies and its inertia around them, for the substeps to come.
  * SILT_FAILED: the force cannot be. */
 silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_error *err);
+/** The water's inertia at the free bodies after its step, as the solves give it: kg, kg m, kg m2, size by size, six rows a body. *inertia is
+ * owned by the caller, also of an error. */
+silt_status silt_run_bodies_inertia(silt_run *run, const silt_step *step, int *size, double **inertia, silt_error *err);
 /** After the discrete elements have moved: the water's step again, with that motion of the bodies; what its force on them differs
  * from what they received is carried to the next step. */
 silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_error *err);
