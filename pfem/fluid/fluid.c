@@ -19,7 +19,7 @@
 
 void silt_fluid_clear(silt_fluid *f) {
     double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->start, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
-                       f->level_force, f->bed_force, f->ride, f->level_brake, f->mass, f->volume,
+                       f->blow, f->level_force, f->bed_force, f->ride, f->level_brake, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
                        f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->pressure_new, f->v_start, f->v_first, f->debt_first, f->normal, f->given, f->cg[0],
                        f->cg[1]};
@@ -350,6 +350,20 @@ static bool own_start(const silt_step *s, int i) {
     return s->body_velocity && s->nodes->kind[i] == NODE_BODY;
 }
 
+// The impulse on bodies of what makes the first velocity free of divergence, with f->scratch as silt_fluid_correct leaves it. Where a body
+// strikes water it is most of the blow: the cells that come have the water's velocity on one side and the body's on the other.
+static void start_blow(silt_fluid *f, const silt_step *s) {
+    const int D = f->dim;
+    for (int i = 0; i < f->n_node && f->blow; i++) {
+        double held[3], loose[3];
+        for (int d = 0; d < D; d++)
+            held[d] = loose[d] = s->mesh->wet[i] && s->nodes->kind[i] == NODE_BODY ? f->scratch[D * i + d] : 0;
+        silt_hold_project(f, i, loose);
+        for (int d = 0; d < D; d++)
+            f->blow[D * i + d] = -f->theta * s->dt * (held[d] - loose[d]);
+    }
+}
+
 // The trapezoidal rule keeps whatever divergence the first velocity has and turns its sign from step to step: remeshing and
 // the mesh's motion put some in, so it is taken out first, on the mesh where the nodes are (projected Runge-Kutta method for
 // index-2 systems: Ascher and Petzold, SIAM J. Numer. Anal. 28, 1991).
@@ -366,6 +380,7 @@ static silt_status project_start(silt_fluid *f, const silt_step *s, const double
     silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
     SILT_TRY(pressure_increment(f, s, false, 1e-2, err));
     silt_fluid_correct(f, s, f->increment, v);
+    start_blow(f, s);
     f->projected = before - kinetic_energy(f, s, v);
     for (int i = 0; i < f->n_node; i++)
         if (s->mesh->wet[i]) {
@@ -462,6 +477,10 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
         out[k] += s->mesh->wet[k / D] ? f->bed_force[k] : 0;
     if (f->film)
         silt_film_press(f->film, D, p, out);
+    for (int k = 0; f->blow && k < D * f->n_node; k++) {
+        out[k] += f->blow[k] / dt;
+        f->worked += f->blow[k] * f->w[k];
+    }
     // the law of the wall brakes what is free
     for (int k = 0; k < f->law.n_point; k++) {
         const int i = f->law.point[k].node;
@@ -711,6 +730,10 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     f->iterations = f->momentum_iterations = f->pressure_iterations = 0;
     f->projected = 0;
     memset(f->impulse, 0, sizeof f->impulse);
+    if (s->scene->n_body) {
+        SILT_RESERVE(f->blow, f->blow_capacity, D * f->n_node + 1);
+        memset(f->blow, 0, (size_t)(D * f->n_node) * sizeof *f->blow);
+    }
     silt_hold_nodes(f, s);
     // kept apart until the step is accepted
     double *p = f->pressure_new, *v = f->v_start;

@@ -38,7 +38,7 @@ typedef struct silt_step {
 /** working space and results of a step; arrays grow only */
 typedef struct silt_fluid {
     int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity,
-        potential_capacity, stand_capacity, v_first_capacity, debt_first_capacity, bed_force_capacity, still_capacity, ride_capacity, level_capacity, level_brake_capacity;
+        potential_capacity, stand_capacity, v_first_capacity, debt_first_capacity, bed_force_capacity, still_capacity, ride_capacity, blow_capacity, level_capacity, level_brake_capacity;
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
@@ -55,6 +55,7 @@ typedef struct silt_fluid {
     double *ride;         // owned, dim per node, m/s, of these places; NULL without slip on bodies
     double *bed_force;    // owned, dim per node, N: what a bent bed or body would push water at rest along with, taken back; NULL without
                           // slip on them
+    double *blow;         // owned, dim per node, N s, of bodies on the water while its first velocity is made free of divergence; NULL without bodies
     double *stand;        // owned, per node, kg/s, added to both sides where explicit viscosity would not be stable; NULL without
     double *potential;    // owned, per node, Pa, density times the potential of a central body force at x_mid; NULL without one
     double *belt;         // owned, dim per node, velocity of a wall's surface along itself; NULL without such walls
