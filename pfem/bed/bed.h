@@ -92,6 +92,8 @@ bool silt_bed_contains(const silt_bed *bed, const double *x);
 bool silt_bed_near(const silt_bed *bed, const double *x, double reach);
 /** height of the bed's surface at x, in space at (x, y), or -HUGE_VAL where there is none */
 double silt_bed_level(const silt_bed *bed, const double *at);
+/** in the plane: the lowest height of the bed's surface from x = from to to, HUGE_VAL where there is none */
+double silt_bed_lowest(const silt_bed *bed, double from, double to);
 silt_status silt_bed_save(const silt_bed *bed, silt_store *store, silt_error *err);
 /** @param walls  as for silt_bed_create */
 silt_status silt_bed_load(silt_bed *bed, const silt_walls *walls, silt_store *store, silt_error *err);

@@ -113,7 +113,7 @@ double silt_bed_rate(const silt_scene *scene, double tau, double threshold, doub
         return 0;
     switch (def->law) {
     case BED_POWER:
-        return excess * sqrt(tau / scene->fluid.density) / def->work;
+        return excess * sqrt(tau / scene->fluid.density) / silt_bed_least_work(def->work);
     case BED_EXCESS_SHEAR:
         return def->erodibility * excess;
     case BED_SHIELDS: {
@@ -345,7 +345,7 @@ void silt_bed_wear(silt_bed *bed, const silt_scene *scene, const silt_nodes *nod
             if (isfinite(def->work))
                 bed->eroded[k] += solid * (def->layer > 0 ? plan * def->layer : patch.height) * work / silt_bed_work(bed, scene, k);
         } else {
-            const double weaker = def->law == BED_POWER ? def->work / silt_bed_work(bed, scene, k) : 1;
+            const double weaker = def->law == BED_POWER ? silt_bed_least_work(def->work) / silt_bed_work(bed, scene, k) : 1;
             bed->eroded[k] += weaker * plan * open * solid * silt_bed_rate(scene, stress.tau, threshold, level) * dt;
         }
     }

@@ -565,3 +565,15 @@ double silt_bed_level(const silt_bed *bed, const double *at) {
     }
     return level;
 }
+
+double silt_bed_lowest(const silt_bed *bed, double from, double to) {
+    const double end[2] = {from, to};
+    double lowest = HUGE_VAL;
+    // the surface is lowest at one of its nodes or at an end
+    for (int k = -2; k < 2 * bed->n_edge; k++) {
+        const double *at = k < 0 ? &end[k + 2] : bed->x[bed->edge[k / 2][k % 2]], level = silt_bed_level(bed, at);
+        if (at[0] >= from && at[0] <= to && level > -HUGE_VAL)
+            lowest = silt_min(lowest, level);
+    }
+    return lowest;
+}

@@ -211,8 +211,6 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
         out[k] += f->level_force[k];
     for (int k = 0; f->bed_force && k < D * f->n_node; k++)
         out[k] += f->bed_force[k];
-    for (int k = 0; s->gap_force && k < D * f->n_node; k++)
-        out[k] += s->gap_force[k];
     if (s->scene->fluid.surface_tension > 0)
         silt_tension_force(s->mesh, f->x_mid, s->scene->fluid.surface_tension, out);
     if (s->pockets)
@@ -386,6 +384,11 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
     for (int pass = 0; pass < 2 && any; pass++) {
         memset(f->increment, 0, (size_t)f->n_node * sizeof(double));
         silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
+        if (f->film) {
+            silt_film_squeeze(f->film, D, NULL, s->body_shift);
+            silt_film_source(f->film, f->residual);
+            silt_film_squeeze(f->film, D, s->body_velocity, s->body_shift);
+        }
         for (int i = 0; i < f->n_node; i++)
             f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
         SILT_TRY(pressure_increment(f, s, false, D == 3 ? FLUID_PAID : 0.03, err));
@@ -449,8 +452,8 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
 
     for (int k = 0; f->bed_force && k < D * f->n_node; k++)
         out[k] += s->mesh->wet[k / D] ? f->bed_force[k] : 0;
-    for (int k = 0; s->gap_force && k < D * f->n_node; k++)
-        out[k] += s->mesh->wet[k / D] ? s->gap_force[k] : 0;
+    if (f->film)
+        silt_film_press(f->film, D, p, out);
     // the law of the wall brakes what is free
     for (int k = 0; k < f->law.n_point; k++) {
         const int i = f->law.point[k].node;
@@ -692,6 +695,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     silt_parts_make(&f->parts, s->mesh);
     const int D = f->dim;
     f->seep = s->seep && s->seep->n_water ? s->seep : NULL;
+    f->film = s->film;
     silt_stiff_end(f->stiff);
     if (!f->pressure)
         f->pressure = silt_pressure_create();

@@ -37,7 +37,7 @@ typedef enum {
     WALL_NO_SLIP = 0,
     WALL_SLIP,
     WALL_LAW, // slip with the traction of the logarithmic law of the wall
-    WALL_DEFAULT, // wall law where the flow is turbulent, no-slip where it is laminar; replaced while reading
+    WALL_DEFAULT, // wall law where the flow is turbulent, no-slip where it is laminar, on bodies slip where cells are too coarse for it; replaced while reading
 } silt_condition;
 /** how a wall is given; a 2-D box becomes a closed polyline while reading */
 typedef enum { WALL_POLYLINE = 1, WALL_BOX, WALL_SURFACE } silt_wall_form;
@@ -369,6 +369,7 @@ typedef enum {
     GAUGE_GRAIN_FORCE,    // grain_force: K: of its contacts
     GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
+    GAUGE_BED_LOWEST, // bed_lowest: [x0, x1]: the lowest place of the bed's surface from x0 = from[0] to x1 = from[1]
 } silt_gauge_kind;
 typedef struct silt_gauge_def {
     char *name; // column name(s) in history.csv

@@ -189,7 +189,7 @@ static bool shell_forward(const int *face, int a, int b) {
 
 static void face_normal(const double *a, const double *b, const double *c, double n[3]) {
     const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    wall_cross(u, v, n);
+    silt_cross(u, v, n);
 }
 
 // the normal that faces of a plane patch keep, else NULL: a face that has shrunk to nothing has none of its own to keep it from folding over
@@ -411,7 +411,7 @@ static double shell_angle(const shell *s, int at, int a, int b) {
         u[d] = s->x[a][d] - s->x[at][d];
         v[d] = s->x[b][d] - s->x[at][d];
     }
-    wall_cross(u, v, n);
+    silt_cross(u, v, n);
     return atan2(silt_length(3, n), wall_dot(u, v));
 }
 
@@ -560,7 +560,7 @@ static double shell_volume(const shell *s, const double (*way)[3], double t) {
         for (int k = 0; k < 3; k++)
             for (int d = 0; d < 3; d++)
                 c[k][d] = s->x[s->face[f][k]][d] - s->fine->centroid[d] + t * way[s->face[f][k]][d];
-        wall_cross(c[1], c[2], n);
+        silt_cross(c[1], c[2], n);
         volume += wall_dot(c[0], n) / 6;
     }
     return volume;
