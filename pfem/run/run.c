@@ -277,6 +277,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     const double wanted = silt_run_pace(run);
     if (step_sane(run, wanted, err) != SILT_OK) {
         run->whole = false; // not worth a checkpoint
+        run->back = -1;
         return SILT_FAILED;
     }
     int64_t n = step_choose(run, wanted);
@@ -316,8 +317,11 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         }
         if (status == SILT_OK)
             break;
-        if (!grains_again(run, &n, attempt, err))
+        if (!grains_again(run, &n, attempt, err)) {
+            // the step may be a good one for another worker, with the same bits where the set-ups are the same
+            run->back = moved ? run->back : run->back_set_up;
             return moved ? water_gave_up(run, attempt + 1, n <= 1, err) : silt_run_grains_failed(run, status, err);
+        }
     }
     if (scene->fluid.on && silt_run_bodies_free(run) && silt_seep_on(scene))
         silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
@@ -385,8 +389,9 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
     silt_view view;
     silt_run_view(run, &view);
     silt_gauges_read(run->gauges, &view, run->gauge);
-    SILT_TRY(silt_history_row(run->history, &view, run->gauge, err));
-    if (run->tick == 0 && run->offset == 0)
+    if (!run->again)
+        SILT_TRY(silt_history_row(run->history, &view, run->gauge, err));
+    if (run->tick == 0 && run->offset == 0 && !run->again)
         SILT_TRY(silt_frame_write(run->out, (int)run->frame, &view, err));
     for (int k = 0; k < PHASE_COUNT; k++)
         run->summary.phase[k] += run->phase[k];
@@ -396,6 +401,8 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
         run->summary.most_iterations = run->fluid.iterations;
     run->summary.steps++;
     run->whole = true;
+    run->back = run->step;
+    run->back_set_up = silt_run_set_up_due(run) ? run->step : run->back_set_up;
     double seconds[CLOCK_COUNT];
     silt_clock_read(seconds);
     run->output_seconds = seconds[CLOCK_output];

@@ -83,6 +83,8 @@ struct silt_run {
     int64_t saved_step; // of the newest checkpoint, -1: none yet
     double saved_time;
     bool whole;         // the state is that of the end of a step, nothing of the next one has been done to it
+    int64_t back, back_set_up; // step whose end a run that fails goes back to, -1: none is worth it; the last one with set_up_due
+    bool again;         // goes over steps that are in the folder already: writes neither rows nor frames, warns of nothing
     int lock;           // descriptor that keeps other runs out of the folder, -1: none
 
     silt_ledger ledger;
