@@ -50,7 +50,7 @@ static bool has_coupling(const silt_run *run) {
 }
 static bool has_bodies(const silt_run *run) {
     return (run->barrier.bodies && run->barrier.bodies->count) || run->body_before || run->body_after || run->body_velocity || run->body_shift ||
-           run->gap_force || run->body_carry || run->uplift;
+           run->body_carry || run->uplift;
 }
 static bool has_fed(const silt_run *run) {
     return run->owed;

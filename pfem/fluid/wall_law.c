@@ -49,6 +49,7 @@ static int condition_of(const silt_scene *scene, const silt_walls *walls, const 
             *roughness = silt_bed_roughness(scene);
         return scene->bed.condition == WALL_DEFAULT ? WALL_NO_SLIP : (int)scene->bed.condition;
     case FACET_BODY:
+        *roughness = scene->body[nodes->owner[mesh->facet[facet][0]]].roughness;
         return (int)scene->body[nodes->owner[mesh->facet[facet][0]]].condition;
     case FACET_WALL:
         *element = walls ? facet_element(walls, nodes, mesh->facet[facet], mesh->dim == 3 ? 3 : 2) : -1;
@@ -243,7 +244,7 @@ static void toe_find(silt_wall_law *law, const silt_scene *scene, const silt_wal
         const bool law_wall = !open && condition_of(scene, walls, nodes, mesh, k, &roughness, &element) == WALL_LAW;
         const int *facet = mesh->facet[k];
         for (int a = 0; a < dim; a++) {
-            edge[facet[a]] |= open ? 1 : law_wall ? 2 : 0;
+            edge[facet[a]] |= open ? 1 : law_wall && nodes->kind[facet[a]] != NODE_BODY ? 2 : 0;
             // out of the wetted part of the wall
             for (int b = 0; b < dim && law_wall; b++)
                 for (int d = 0; d < dim && b != a; d++)

@@ -103,6 +103,19 @@ static silt_status run_loop(silt_run *run, silt_error *err) {
     return silt_run_checkpoint(run, err);
 }
 
+// a run that went to its end and whose ledgers are beyond the scene's bounds says so
+static void run_judge(silt_run *run, bool whole) {
+    silt_bounds *bounds = &run->summary.bounds;
+    if (!silt_bounds_measure(run->scene, run->out, bounds) || !whole)
+        return;
+    for (silt_bound_kind k = 0; k < BOUND_COUNT; k++) {
+        char text[256];
+        double allowed;
+        if (silt_bounds_broken(bounds, run->scene, k, &allowed, text))
+            silt_run_warn(run, "beyond its bounds: %s", text);
+    }
+}
+
 // summary and history are closed whatever happened; the first error is the one that is told
 silt_status silt_run_finish(silt_run **owned, silt_status status, silt_error *err) {
     silt_run *run = *owned;
@@ -117,6 +130,7 @@ silt_status silt_run_finish(silt_run **owned, silt_status status, silt_error *er
         silt_progress(&view, run_end(run), run->summary.seconds, true);
     silt_error late = {0};
     silt_status closed = silt_history_close(&run->history, &late);
+    run_judge(run, status == SILT_OK);
     if (closed == SILT_OK)
         closed = silt_summary_write(run->out, &view, &run->summary, &late);
     if (status == SILT_OK && closed != SILT_OK) {

@@ -4,7 +4,6 @@
 #include "bed_law.h"
 #include "run.h"
 
-#define VOLUME_OFF 0.05    // largest share of the water that may be off without a word
 #define BED_Y_PLUS 5.0     // largest height of the first cell in wall units: the viscous sublayer
 #define PRESSURE_SLOPE 0.2 // largest share by which output carries the pressure on to the end of the step
 
@@ -130,7 +129,7 @@ static silt_step water_see(silt_run *run) {
         step.body_shift = run->body_shift;
     }
     step.body_start = run->body_start;
-    step.gap_force = run->gaps ? run->gap_force : NULL;
+    step.film = run->film;
     return step;
 }
 
@@ -371,7 +370,7 @@ silt_status silt_run_measure(silt_run *run, silt_error *err) {
 // water that is owed is not lost, but where there is so much of it the cells are too large for what it does: told once a run
 static void volume_held(silt_run *run) {
     const silt_ledger *ledger = &run->ledger;
-    if (run->volume_told || !run->scene->fluid.on || !(fabs(ledger->volume_error) > VOLUME_OFF))
+    if (run->volume_told || !run->scene->fluid.on || !(fabs(ledger->volume_error) > run->scene->bounds.volume))
         return;
     run->volume_told = true;
     silt_run_warn(run, "the water's volume is off by %.3g %%, %.3g m3 of it are owed and come back later: the cells are too large for what the water "
@@ -435,6 +434,7 @@ void silt_run_free(silt_run *run) {
     free(run->waiting);
     free(run->rest);
     free(run->owed);
+    free(run->pick);
     free(run->freed);
     free(run->freed_area);
     free(run->grown);
@@ -447,7 +447,6 @@ void silt_run_free(silt_run *run) {
     free(run->body_carry);
     free(run->body_water);
     silt_uplift_free(&run->uplift);
-    free(run->gap_force);
     free(run->x_old);
     free(run->p_old);
     free(run->p_shown);

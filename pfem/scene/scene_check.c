@@ -342,7 +342,7 @@ static const char *const check_fixed[] = {
     "bed_y_plus", "seepage", "seepage_volume", "seepage_lost", "grain_count", "grain_mass", "grain_velocity_x",
     "grain_velocity_y", "grain_velocity_z", "grain_kinetic_energy", "grain_potential_energy", "grain_water_x",
     "grain_water_y", "grain_water_z", "grain_contact_x", "grain_contact_y", "grain_contact_z", "sediment_error",
-    "left_mass", "fed_mass", "inflow_mass", "outflow_mass", "wall_mesh", "wall_assemble", "wall_solve", "wall_bed", "wall_dem",
+    "left_mass", "fed_mass", "body_kinetic_energy", "body_potential_energy", "inflow_mass", "outflow_mass", "wall_mesh", "wall_assemble", "wall_solve", "wall_bed", "wall_dem",
     "wall_move", "wall_output"};
 // clang-format on
 static const char *const check_of_body[] = {"x",  "y",  "z",  "vx", "vy", "vz", "qw", "qx", "qy", "qz", "wx",
