@@ -2,7 +2,7 @@
 # lint.sh BUILD [cppcheck] [tidy] [analyzer]: what reads the code without running it, over pfem and dem-coupling; without a name all three.
 # BUILD: configured with -DCMAKE_EXPORT_COMPILE_COMMANDS=ON. A finding is "TOOL FILE CHECK LINE"; those whose first three words stand in
 # tests/lint.txt are explained there and passed over, any other one is printed and makes the exit code 1. By hand: it takes minutes.
-# LINT_FILES="FILE..." in the environment: only these; LINT_JOBS: so many of clang-tidy at a time.
+# LINT_FILES="FILE..." in the environment: only these; LINT_JOBS: so many of clang-tidy at a time; LINT_SECONDS: what the analyzer may take for a file (300).
 set -eu
 build=$1
 shift
@@ -46,8 +46,8 @@ for entry in json.load(open(sys.argv[1])):
         print(entry["command"].split(" -o ")[0])
         break' "$build/compile_commands.json" "$root/$file")
             [ -n "$command" ] || continue
-            # 300 s of its own time, whatever else runs
-            (cd "$build" && ulimit -t 300 && $command -O1 -Wno-error -fanalyzer -S -o /dev/null "$root/$file") > "$work/out" 2>&1 ||
+            # so many seconds of its own time, whatever else runs
+            (cd "$build" && ulimit -t "${LINT_SECONDS:-300}" && $command -O1 -Wno-error -fanalyzer -S -o /dev/null "$root/$file") > "$work/out" 2>&1 ||
                 echo "analyzer $file timeout 0" >> "$work/found"
             collect analyzer "$work/out"
         done
