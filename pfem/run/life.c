@@ -143,7 +143,7 @@ bool silt_run_ended(const silt_run *run) {
 // what a signal or the wall's clock asks for, and the checkpoints that the scene asks for
 static silt_status run_keep(silt_run *run, int64_t frames_between, silt_error *err) {
     const bool late = run_late(run);
-    if ((run_asked || late) && silt_run_set_up_due(run) && !silt_run_ended(run)) {
+    if ((run_asked || late) && silt_run_set_up_due(run, run->dt) && !silt_run_ended(run)) {
         run_asked = 0;
         SILT_TRY(silt_run_checkpoint(run, err));
         if (run_stop || late)

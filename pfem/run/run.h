@@ -143,7 +143,7 @@ void silt_run_free(silt_run *run);
 
 // grains.c --------------------------------------------------------------------------------------------
 /** true where the discrete elements are set up anew: checkpoints are taken at such places only */
-bool silt_run_set_up_due(const silt_run *run);
+bool silt_run_set_up_due(const silt_run *run, double last);
 /** Grains and bodies over n of their steps, under the water's forces. again: the step was cut. */
 silt_status silt_run_grains(silt_run *run, int n, bool again, silt_error *err);
 /** what the discrete elements say of their failure, with the step and the bodies. @return status */
