@@ -5,7 +5,9 @@
 #include <errno.h>
 #include <unistd.h>
 
-// even steps of lightness from dark blue to yellow (the palette known as viridis)
+// even steps of lightness: still water deep blue, fast water pale
+static const unsigned draw_water[] = {0x0b2d5c, 0x15487f, 0x1f65a4, 0x2b87bb, 0x46a9c2, 0x74c5bd, 0xa8d9ac, 0xd8e79a, 0xf6ee8c};
+// from dark blue to yellow (the palette known as viridis)
 static const unsigned draw_map[] = {0x440154, 0x482878, 0x3e4989, 0x31688e, 0x26828e,
                                     0x1f9e89, 0x35b779, 0x6ece58, 0xb5de2b, 0xfde725};
 // untouched sand to worn
@@ -15,10 +17,10 @@ static const unsigned draw_turn[] = {0x16345f, 0x2f6da8, 0x86b7d8, 0xf4f4f2, 0xe
 #define DRAW_MAP(table) table, sizeof(table) / sizeof *(table)
 
 static const silt_draw_field draw_fields[] = {
-    {"speed", "speed, m/s", "PointData/velocity", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
+    {"speed", "speed, m/s", "PointData/velocity", NULL, MADE_LENGTH, DRAW_MAP(draw_water)},
     {"pressure", "pressure, Pa", "PointData/pressure", "PointData/pressure", MADE_LENGTH, DRAW_MAP(draw_map)},
     {"porosity", "porosity", "PointData/porosity", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
-    {"elevation", "elevation, m", "PointData/pressure", NULL, MADE_ELEVATION, DRAW_MAP(draw_map)},
+    {"elevation", "elevation, m", "PointData/pressure", NULL, MADE_ELEVATION, DRAW_MAP(draw_water)},
     {"vorticity", "vorticity, 1/s", "PointData/velocity", NULL, MADE_VORTICITY, DRAW_MAP(draw_turn)},
     {"mesh", NULL, NULL, NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
     {"bed", "frictional work, J/m³", NULL, "PointData/work", MADE_LENGTH, DRAW_MAP(draw_worn)},

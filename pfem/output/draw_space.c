@@ -418,7 +418,8 @@ static void space_axis(space *s, int axis, const double *corner, const double aw
         cairo_line_to(cr, p[0] + 6 * away[0], p[1] + 6 * away[1]);
         cairo_stroke(cr);
         silt_draw_number(text, v, step);
-        silt_draw_text(cr, p[0] + 12 * away[0], p[1] + 14 * away[1], align, 14, false, text);
+        if (axis != 1 || v > c->lo[axis] + 0.3 * step) // the number of the first axis' end stands there
+            silt_draw_text(cr, p[0] + 12 * away[0], p[1] + 14 * away[1], align, 14, false, text);
     }
     a[axis] = 0.5 * (c->lo[axis] + c->hi[axis]);
     space_pixel(s, a, p);
