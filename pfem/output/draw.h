@@ -85,6 +85,9 @@ void silt_draw_forms_free(silt_draw_forms **forms);
 /** Body's surface at a time of history.csv. *point: its points there, owned by the caller. @return NULL: not known */
 const silt_solid *silt_draw_form(const silt_draw_forms *forms, const silt_scene *scene, int body, double time, double **point);
 
+/** silt_draw_read of the bodies, in space with those surfaces where they are known */
+bool silt_draw_bodies(const silt_draw_canvas *c, const silt_frame_entry *entry, silt_grid *grid);
+
 // draw_film.c
 /** All frames as one moving picture. The file's ending says which kind: mp4, webm, webp, gif; made by ffmpeg, which must be
  * installed. */

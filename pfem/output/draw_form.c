@@ -62,3 +62,43 @@ const silt_solid *silt_draw_form(const silt_draw_forms *f, const silt_scene *sce
     }
     return solid;
 }
+
+// the surfaces of all bodies in one grid, or false: the frame's stays
+static bool form_grid(const silt_draw_canvas *c, double time, silt_grid *grid) {
+    silt_grid made = {.time = grid->time};
+    int points = 0, cells = 0;
+    for (int i = 0; i < c->forms->n; i++) {
+        points += c->forms->solid[i].n_point;
+        cells += c->forms->solid[i].n_face;
+    }
+    made.x = silt_alloc(3 * (size_t)points + 1, sizeof *made.x);
+    made.offset = silt_alloc((size_t)cells + 1, sizeof *made.offset);
+    made.link = silt_alloc(3 * (size_t)cells + 1, sizeof *made.link);
+    for (int i = 0; i < c->forms->n; i++) {
+        double *point = NULL;
+        const silt_solid *solid = silt_draw_form(c->forms, c->scene, i, time, &point);
+        if (!solid) {
+            silt_grid_clear(&made);
+            return false;
+        }
+        memcpy(made.x + 3 * made.n_point, point, 3 * (size_t)solid->n_point * sizeof *point);
+        for (int f = 0; f < solid->n_face; f++, made.n_cell++) {
+            for (int k = 0; k < 3; k++)
+                made.link[3 * made.n_cell + k] = made.n_point + solid->face[f][k];
+            made.offset[made.n_cell + 1] = 3 * (made.n_cell + 1);
+        }
+        made.n_point += solid->n_point;
+        free(point);
+    }
+    silt_grid_clear(grid);
+    *grid = made;
+    return true;
+}
+
+bool silt_draw_bodies(const silt_draw_canvas *c, const silt_frame_entry *entry, silt_grid *grid) {
+    if (!silt_draw_read(c, grid, "bodies", entry->number, NULL))
+        return false;
+    if (c->forms)
+        form_grid(c, entry->time, grid);
+    return true;
+}

@@ -281,55 +281,41 @@ static void space_water(space *s, int number) {
 // from a face to the mean of those around a corner: below this angle the surface is round there, above it has an edge (of a box 45)
 #define SPACE_ROUND 38
 
-// triangles of a surface, round where it is round
-static void space_surface(space *s, int n_point, const double *x, int n_face, const int (*face_node)[3]) {
-    const silt_draw_colour stone = silt_draw_hex(0xb9b4ac);
-    double *smooth = silt_alloc(3 * (size_t)n_point + 1, sizeof *smooth), normal[3];
-    for (int pass = 0; pass < 2; pass++)
-        for (int i = 0; i < n_face; i++) {
-            const int *node = face_node[i];
-            space_face face = {.x = {x + 3 * node[0], x + 3 * node[1], x + 3 * node[2]}, .flat = stone, .plain = 0.5, .lit = 0.55};
-            space_normal(face.x[0], face.x[1], face.x[2], normal);
-            for (int a = 0; a < 3 && pass == 0; a++)
-                for (int d = 0; d < 3; d++)
-                    smooth[3 * node[a] + d] += normal[d];
-            space_unit(normal);
-            if (pass == 0 || space_dot(normal, s->eye) <= 0)
-                continue;
-            for (int a = 0; a < 3; a++) {
-                double mean[3];
-                memcpy(mean, smooth + 3 * node[a], sizeof mean);
-                space_unit(mean);
-                memcpy(face.normal[a], space_dot(mean, normal) > cos(SPACE_ROUND * M_PI / 180) ? mean : normal, sizeof mean);
-            }
-            space_fill(s, &face);
-        }
-    free(smooth);
+// corners of the triangle of polygon i that ends at its corner k + 1: polygons are taken as fans
+static void space_fan(const silt_grid *grid, int i, int k, int node[3]) {
+    node[0] = grid->link[grid->offset[i]];
+    node[1] = grid->link[k];
+    node[2] = grid->link[k + 1];
 }
 
-// bodies as the scene has them, else as the frame does: polygons are taken as fans
+// round where they are round
 static void space_bodies(space *s, const silt_frame_entry *entry) {
+    const silt_draw_colour stone = silt_draw_hex(0xb9b4ac);
     silt_grid grid;
-    if (!silt_draw_read(s->c, &grid, "bodies", entry->number, NULL))
+    if (!silt_draw_bodies(s->c, entry, &grid))
         return;
-    bool known = s->c->forms != NULL;
-    for (int i = 0; i < s->c->scene->n_body && known; i++) {
-        double *point = NULL;
-        const silt_solid *solid = silt_draw_form(s->c->forms, s->c->scene, i, entry->time, &point);
-        if (solid)
-            space_surface(s, solid->n_point, point, solid->n_face, (const int(*)[3])solid->face);
-        free(point);
-        known = solid != NULL;
-    }
-    int (*fan)[3] = silt_alloc((size_t)(grid.n_cell ? grid.offset[grid.n_cell] : 0) + 1, sizeof *fan), n = 0;
-    for (int i = 0; i < grid.n_cell && !known; i++)
-        for (int k = grid.offset[i] + 1; k + 1 < grid.offset[i + 1]; k++, n++) {
-            fan[n][0] = grid.link[grid.offset[i]];
-            fan[n][1] = grid.link[k];
-            fan[n][2] = grid.link[k + 1];
-        }
-    space_surface(s, grid.n_point, grid.x, n, (const int(*)[3])fan);
-    free(fan);
+    double *smooth = silt_alloc(3 * (size_t)grid.n_point + 1, sizeof *smooth), normal[3], mean[3];
+    int node[3];
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < grid.n_cell; i++)
+            for (int k = grid.offset[i] + 1; k + 1 < grid.offset[i + 1]; k++) {
+                space_fan(&grid, i, k, node);
+                space_face face = {.x = {grid.x + 3 * node[0], grid.x + 3 * node[1], grid.x + 3 * node[2]}, .flat = stone, .plain = 0.5, .lit = 0.55};
+                space_normal(face.x[0], face.x[1], face.x[2], normal);
+                for (int a = 0; a < 3 && pass == 0; a++)
+                    for (int d = 0; d < 3; d++)
+                        smooth[3 * node[a] + d] += normal[d];
+                space_unit(normal);
+                if (pass == 0 || space_dot(normal, s->eye) <= 0)
+                    continue;
+                for (int a = 0; a < 3; a++) {
+                    memcpy(mean, smooth + 3 * node[a], sizeof mean);
+                    space_unit(mean);
+                    memcpy(face.normal[a], space_dot(mean, normal) > cos(SPACE_ROUND * M_PI / 180) ? mean : normal, sizeof mean);
+                }
+                space_fill(s, &face);
+            }
+    free(smooth);
     silt_grid_clear(&grid);
 }
 
