@@ -149,7 +149,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
 
 // grains came, went or moved: what was made of them is out of date
 static void coupling_touched(silt_coupling *c) {
-    c->found = c->view->fresh = false;
+    c->found = c->view->fresh = c->crowds->fresh[0] = false;
 }
 
 static coupling_grain *coupling_append(silt_coupling *c, const double *x, const double *v, double radius) {
@@ -260,6 +260,7 @@ static void coupling_release(silt_coupling *c, int n, const silt_release *releas
 static void coupling_deposit(silt_coupling *c, int grain) {
     coupling_grain *g = &c->grain[c->view->map[grain]];
     silt_frozen_add(&c->frozen, g->x, g->radius, &c->next_id);
+    c->crowds->fresh[1] = false;
     coupling_take(c, g);
 }
 
@@ -271,17 +272,34 @@ static double coupling_wall_distance(const silt_walls *walls, int i, const doubl
     return hypot(d[0] - t * e[0], d[1] - t * e[1]);
 }
 
-static double coupling_apart(const silt_coupling *c, const double *x, const double *y) {
-    return hypot(hypot(x[0] - y[0], x[1] - y[1]), c->dim == 3 ? x[2] - y[2] : 0.0);
+// bins as wide as the usual sphere
+static const silt_crowd *coupling_moving(const silt_coupling *c) {
+    silt_crowd *crowd = &c->crowds->moving;
+    if (c->crowds->fresh[0])
+        return crowd;
+    silt_crowd_start(crowd, 2.0 * (c->parcel > 0.0 ? c->parcel : c->dem_def.max_radius));
+    for (int i = 0; i < c->n_grain; i++)
+        if (!c->grain[i].gone)
+            silt_crowd_add(crowd, c->grain[i].x, c->grain[i].radius);
+    c->crowds->fresh[0] = true;
+    return crowd;
+}
+
+static const silt_crowd *coupling_crust(const silt_coupling *c) {
+    silt_crowd *crowd = &c->crowds->frozen;
+    if (c->crowds->fresh[1])
+        return crowd;
+    silt_crowd_start(crowd, 2.0 * (c->crust > 0.0 ? c->crust : c->dem_def.max_radius));
+    for (int i = 0; i < c->frozen.count; i++)
+        silt_crowd_add(crowd, c->frozen.sphere[i].x, c->frozen.sphere[i].radius);
+    c->crowds->fresh[1] = true;
+    return crowd;
 }
 
 // free distance from a point to grains and bodies
-static double coupling_gap(const void *context, const double *x) {
+static double coupling_gap(const void *context, const double *x, double far) {
     const silt_coupling *c = context;
-    double gap = HUGE_VAL;
-    for (int i = 0; i < c->n_grain; i++)
-        if (!c->grain[i].gone)
-            gap = silt_min(gap, coupling_apart(c, x, c->grain[i].x) - c->grain[i].radius);
+    double gap = silt_crowd_gap(coupling_moving(c), x, far);
     for (int i = 0; i < c->bodies->count; i++)
         gap = silt_min(gap, silt_coupling_body_distance(c, i, x, gap));
     return gap;
@@ -289,13 +307,8 @@ static double coupling_gap(const void *context, const double *x) {
 
 static bool coupling_room(const silt_coupling *c, const double *x, double radius) {
     double need = (1.0 - room_overlap) * radius;
-    if (coupling_gap(c, x) < need)
+    if (coupling_gap(c, x, need) < need || silt_crowd_gap(coupling_crust(c), x, need) < need)
         return false;
-    for (int i = 0; i < c->frozen.count; i++) {
-        const silt_frozen_sphere *s = &c->frozen.sphere[i];
-        if (coupling_apart(c, x, s->x) - s->radius < need)
-            return false;
-    }
     if (c->dim == 3)
         return c->walls->count == 0 || silt_walls_distance(c->walls, x, &(int){0}) >= need;
     for (int i = 0; i < c->walls->count; i++)
@@ -306,6 +319,7 @@ static bool coupling_room(const silt_coupling *c, const double *x, double radius
 
 static void coupling_bed_changed(silt_coupling *c, const silt_bed *bed) {
     silt_frozen_update(&c->frozen, bed, c->crust, &c->next_id, coupling_gap, coupling_forget, c);
+    c->crowds->fresh[1] = false;
 }
 
 // ---------------------------------------------------------------- exchange with the water
@@ -572,6 +586,7 @@ static silt_status coupling_create(silt_coupling **coupling, const silt_coupling
     c->dim = def->scene->dimension == 3 ? 3 : 2;
     c->next_id = c->sent_id = 1;
     c->view = silt_alloc(1, sizeof *c->view);
+    c->crowds = silt_alloc(1, sizeof *c->crowds);
     SILT_TRY(silt_coupling_bodies(c, err));
     coupling_measure(c, def);
     return silt_trace_open(c, def->trace, def->resumed, def->walls->time, err);
@@ -657,6 +672,9 @@ static void coupling_close(silt_coupling **coupling) {
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);
+    silt_crowd_clear(&c->crowds->moving);
+    silt_crowd_clear(&c->crowds->frozen);
+    free(c->crowds);
     silt_exchange_clear(&c->exchange);
     silt_locator_clear(&c->locator);
     free(c);

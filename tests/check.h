@@ -19,11 +19,19 @@ static silt_error error;
             fail_msg("%s: %s", #call, error.text);                                                                     \
     } while (0)
 
-static void near(double value, double expected, double tolerance, const char *what) {
+static inline void near(double value, double expected, double tolerance, const char *what) {
     if (getenv("SILT_TELL"))
         printf("told\t%.9g\t%.9g\t%g\t%s\n", value, expected, tolerance, what);
     if (!(fabs(value - expected) <= tolerance))
         fail_msg("%s: %.17g, expected %.17g within %g", what, value, expected, tolerance);
+}
+
+/** nothing was put there */
+static inline bool zero(const void *data, size_t size) {
+    for (size_t k = 0; k < size; k++)
+        if (((const char *)data)[k])
+            return false;
+    return true;
 }
 
 #endif

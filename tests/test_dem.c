@@ -12,17 +12,9 @@
 
 #include <cmocka.h>
 
+#include "check.h"
+
 #define LOG "test_dem.log"
-
-static silt_error error;
-
-// a call that has to work; shows the message when it does not
-#define OK(call)                                                                                                       \
-    do {                                                                                                               \
-        error = (silt_error){0};                                                                                       \
-        if ((call) != SILT_OK)                                                                                         \
-            fail_msg("%s: %s", #call, error.text);                                                                     \
-    } while (0)
 
 #define FAILS(call, part)                                                                                              \
     do {                                                                                                               \
@@ -61,11 +53,6 @@ static const silt_dem_state *advance(silt_dem *dem, int n, const double *force, 
 }
 
 static const double mass = 2500 * 4.0 / 3.0 * M_PI * 1e-6;
-
-static void near(double value, double expected, double tolerance, const char *what) {
-    if (!(fabs(value - expected) <= tolerance))
-        fail_msg("%s: %.17g, expected %.17g within %g", what, value, expected, tolerance);
-}
 
 static void test_open_close(void **unused) {
     (void)unused;

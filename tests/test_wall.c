@@ -852,7 +852,7 @@ static void test_ball_slide(void **state) {
         int feature;
         wall_nearest(&b->walls, e, from, on, &feature);
         memcpy(n, b->walls.normal[e], sizeof n);
-        wall_cross(n, (const double[]){0.2, 0.3, 1}, v);
+        silt_cross(n, (const double[]){0.2, 0.3, 1}, v);
         const double length = sqrt(wall_dot(v, v));
         for (int d = 0; d < 3; d++)
             v[d] /= length;
@@ -941,7 +941,7 @@ static void test_motion_lands(void **state) {
             double gone = 0.4;
             for (int k = 1; k <= 40; k++) {
                 silt_walls_move(&b->walls, &b->scene, k * dt, dt);
-                double given[3], vector[3], *v = b->nodes.v + dim * i, before[3], after[3];
+                double given[3], vector[3], *v = b->nodes.v + dim * i, before[3] = {0}, after[3] = {0};
                 const silt_hold hold = silt_walls_hold(&b->walls, b->nodes.wall[i], vector);
                 assert_int_equal(hold, slip ? HOLD_NORMAL : HOLD_ALL);
                 silt_walls_given(&b->walls, &b->scene, b->nodes.wall[i], b->nodes.x, given);
@@ -1141,7 +1141,7 @@ static void test_hole(void **state) {
                 u[d] = c[1][d] - c[0][d];
                 v[d] = c[2][d] - c[0][d];
             }
-            wall_cross(u, v, n);
+            silt_cross(u, v, n);
             area += 0.5 * sqrt(wall_dot(n, n));
             for (int k = 0; k < 3; k++)
                 if (b->walls.joined[e][k] < 0)

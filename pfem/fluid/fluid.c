@@ -212,13 +212,20 @@ static void momentum_right(silt_fluid *f, const silt_step *s, const double *p, d
         out[k] += f->level_force[k];
     for (int k = 0; f->bed_force && k < D * f->n_node; k++)
         out[k] += f->bed_force[k];
-    for (int k = 0; s->gap_force && k < D * f->n_node; k++)
-        out[k] += s->gap_force[k];
     if (s->scene->fluid.surface_tension > 0)
         silt_tension_force(s->mesh, f->x_mid, s->scene->fluid.surface_tension, out);
     if (s->pockets)
         silt_pockets_force(s->pockets, D, 0.5 * s->dt, f->w, out);
     silt_assemble_pressure(f, s->mesh, p, out);
+}
+
+// points on bodies move with them
+static void law_follow_bodies(silt_fluid *f, const silt_step *s) {
+    for (int q = 0; q < f->law.n_point; q++) {
+        silt_wall_point *point = &f->law.point[q];
+        if (s->nodes->kind[point->node] == NODE_BODY && s->body_velocity)
+            memcpy(point->velocity, s->body_velocity + f->dim * point->node, (size_t)f->dim * sizeof(double));
+    }
 }
 
 // resistance of the present iterate: traction of walls, then geometry, then viscosity of every cell
@@ -227,6 +234,7 @@ static void resist(silt_fluid *f, const silt_step *s) {
         memset(f->friction, 0, (size_t)f->n_node * sizeof *f->friction);
     if (f->law.n_point) {
         memset(f->wall_force, 0, (size_t)(f->dim * f->n_node) * sizeof *f->wall_force);
+        law_follow_bodies(f, s);
         silt_wall_law_traction(&f->law, s->scene, f->dim, f->w, f->friction, f->wall_force);
     }
     if (f->level_force)
@@ -251,10 +259,7 @@ static void resist_begin(silt_fluid *f, const silt_step *s) {
         silt_depth_update(&f->depth, s->scene, s->walls, s->nodes, s->mesh, s->nodes->x);
     if (s->drag && s->scene->grains.eddy_limit > 0 && silt_turbulence_model(s->scene) != TURBULENCE_NONE)
         silt_depth_crowd(&f->depth, s->mesh, s->nodes->x, s->drag->solid, s->scene->grains.eddy_limit);
-    bool law = s->scene->bed.on && s->scene->bed.condition == WALL_LAW;
-    for (int k = 0; k < s->scene->n_wall; k++)
-        law |= s->scene->wall[k].condition == WALL_LAW;
-    if (!law)
+    if (!silt_scene_law(s->scene))
         return;
     silt_wall_law_place(&f->law, s->scene, s->walls, s->nodes, s->mesh, s->nodes->x);
     if (f->law.n_point)
@@ -415,6 +420,11 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
     for (int pass = 0; pass < 2 && any; pass++) {
         memset(f->increment, 0, (size_t)f->n_node * sizeof(double));
         silt_assemble_divergence(f, s->mesh, f->shift, f->increment, f->residual);
+        if (f->film) {
+            silt_film_squeeze(f->film, D, NULL, s->body_shift);
+            silt_film_source(f->film, f->residual);
+            silt_film_squeeze(f->film, D, s->body_velocity, s->body_shift);
+        }
         for (int i = 0; i < f->n_node; i++)
             f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
         SILT_TRY(pressure_increment(f, s, false, D == 3 ? FLUID_PAID : 0.03, err));
@@ -478,8 +488,8 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
 
     for (int k = 0; f->bed_force && k < D * f->n_node; k++)
         out[k] += s->mesh->wet[k / D] ? f->bed_force[k] : 0;
-    for (int k = 0; s->gap_force && k < D * f->n_node; k++)
-        out[k] += s->mesh->wet[k / D] ? s->gap_force[k] : 0;
+    if (f->film)
+        silt_film_press(f->film, D, p, out);
     // the law of the wall brakes what is free
     for (int k = 0; k < f->law.n_point; k++) {
         const int i = f->law.point[k].node;
@@ -721,6 +731,7 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     silt_parts_make(&f->parts, s->mesh);
     const int D = f->dim;
     f->seep = s->seep && s->seep->n_water ? s->seep : NULL;
+    f->film = s->film;
     silt_stiff_end(f->stiff);
     if (!f->pressure)
         f->pressure = silt_pressure_create();
@@ -729,6 +740,13 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     f->projected = 0;
     memset(f->impulse, 0, sizeof f->impulse);
     silt_hold_nodes(f, s);
+    // kept apart until the step is accepted
+    double *p = f->pressure_new, *v = f->v_start;
+    memcpy(v, nodes->v, (size_t)D * (size_t)f->n_node * sizeof(double));
+    // with the normals of the start: with those of the midpoint a body that turns blows water into the first velocity
+    for (int i = 0; i < f->n_node && s->body_start; i++)
+        if (silt_hold_slips(s, i) && s->mesh->wet[i])
+            silt_hold_replace(f, i, s->body_start + D * i, nodes->v + D * i);
     for (int i = 0; i < f->n_node; i++) {
         for (int d = 0; d < D; d++)
             f->w[D * i + d] = s->mesh->wet[i] ? nodes->v[D * i + d] : 0;
@@ -748,12 +766,6 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
         silt_pockets_load(s->pockets, s->mesh, f->x_mid);
     silt_debts_ask(f, s);
 
-    // kept apart until the step is accepted
-    double *p = f->pressure_new, *v = f->v_start;
-    memcpy(v, nodes->v, (size_t)D * (size_t)f->n_node * sizeof(double));
-    for (int i = 0; i < f->n_node && s->body_start; i++)
-        if (silt_hold_slips(s, i) && s->mesh->wet[i])
-            silt_hold_replace(f, i, s->body_start + D * i, nodes->v + D * i);
     for (int i = 0; i < f->n_node; i++)
         // with the Laplacian the surface's pressure is prescribed
         p[i] = s->mesh->wet[i] && !(def->pressure == PRESSURE_LAPLACIAN && s->mesh->surface[i]) ? nodes->p[i] : 0;

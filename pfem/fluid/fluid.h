@@ -7,6 +7,7 @@
 #ifndef SILT_FLUID_H
 #define SILT_FLUID_H
 
+#include "film.h"
 #include "parts.h"
 #include "pocket.h"
 #include "seep.h"
@@ -28,10 +29,10 @@ typedef struct silt_step {
     silt_seep *seep;             // prepared for this step; NULL where the bed lets no water through
     silt_nodes *nodes;
     double time, dt;             // s, start and length
-    // dim per node, m/s, of nodes on bodies: velocity of the momentum, and what carries their places beside it; NULL: the nodes' own, none
+    // dim per node, m/s, of nodes on bodies and of slaves of films: velocity of the momentum, and what carries their places beside it; NULL: the nodes' own, none
     const double *body_velocity, *body_shift;
     const double *body_start; // dim per node, m/s, of nodes on bodies where water slips: the body's velocity as the step begins; NULL: none
-    const double *gap_force; // dim per node, N, of the water in gaps too narrow for cells on what is at their mouths; NULL: none
+    silt_film *film;         // found for this step; NULL: no body is so near to anything
 } silt_step;
 
 /** working space and results of a step; arrays grow only */
@@ -87,6 +88,7 @@ typedef struct silt_fluid {
     silt_pressure *pressure; // owned
     silt_stiff *stiff;    // owned
     silt_seep *seep;      // the step's
+    silt_film *film;      // the step's
     silt_mix *mix;        // owned
     double theta;         // implicitness of the step: fluid.theta, more where viscosity is stiff
     silt_depth depth;     // owned, distances to walls and surface; empty where viscosity is the same everywhere
@@ -135,6 +137,9 @@ void silt_hold_bent(silt_fluid *fluid, const silt_step *step);
 bool silt_hold_slips(const silt_step *step, int i);
 /** Takes the bodies' motion anew: at the velocity that they are held at, where water slips its normal part. */
 void silt_hold_bodies_again(silt_fluid *fluid, const silt_step *step);
+/** Normal of a facet that moves evenly from x over x_mid, into the water, as large as the facet, mean over the step: the continuity of a cell
+ * in space asks for that one, in the plane it is that of the middle. x_mid = x: where it is */
+void silt_facet_mean_normal(const silt_mesh *mesh, const double *x, const double *x_mid, const int *facet, double n[3]);
 /** v with its held components those of `own` */
 void silt_hold_replace(const silt_fluid *fluid, int i, const double *own, double *v);
 /** silt_hold_impose; on bent walls the velocity keeps its size: turning does no work */
@@ -251,11 +256,14 @@ void silt_pressure_forget(silt_pressure *pressure);
 
 
 // impedance.c ---------------------------------------------------------------------------------------------
-/** What the step that was just solved answers to a change of its velocity on held nodes: motion, dim per node, nought where nothing
- * changes. Linear: the matrix of the step's end, whose momentum and continuity are solved for it. reaction, dim per node: change of
- * the forces that hold the held nodes, N per m/s; pressure, 1 per node: change of it. Takes fluid->reaction as working space. */
-silt_status silt_fluid_mode(silt_fluid *fluid, const silt_step *step, const double *motion, double *reaction, double *pressure,
-                            silt_error *err);
+/** What the step that was just solved answers to a change of the velocity of bodies' nodes: motion, dim per node, also of those under
+ * films, nought where nothing changes. Linear: the matrix of the step's end, whose momentum and continuity are solved for it. w, dim per node,
+ * and pressure, 1 per node: change of velocity and pressure. Takes fluid->reaction as working space, and leaves the film's squeeze. */
+silt_status silt_fluid_mode(silt_fluid *fluid, const silt_step *step, const double *motion, double *w, double *pressure, silt_error *err);
+/** The operators of such a change: force, dim per node, of inertia and viscosity at w; rate, 1 per node, of the smoothing at p. With a
+ * second mode's w' and p' the sum w'.force + p'.rate is the work of the first one's forces on the second one's motion: symmetric, and never
+ * negative for w' = w, however far the modes were solved. */
+void silt_fluid_mode_answer(silt_fluid *fluid, const silt_step *step, const double *w, const double *p, double *force, double *rate);
 
 // fluid.c
 /** v += P G q/inertia */

@@ -40,7 +40,7 @@ static double mode_divergence(silt_fluid *f, const silt_step *s, const double *w
     silt_assemble_projection(f, s->mesh, p);
     silt_assemble_continuity(f, s->mesh, NULL, NULL, w, p);
     for (int i = 0; i < f->n_node; i++) {
-        f->residual[i] = s->mesh->wet[i] && f->mobile[i] == 1 ? -f->residual[i] : 0;
+        f->residual[i] = s->mesh->wet[i] ? -f->residual[i] : 0;
         square += silt_square(f->residual[i]);
     }
     return square;
@@ -56,22 +56,23 @@ static void mode_excess(silt_fluid *f, const silt_step *s, const double *w, doub
     silt_assemble_mass_excess(f, s->mesh, s->scene->fluid.density, acceleration, excess);
 }
 
-silt_status silt_fluid_mode(silt_fluid *f, const silt_step *s, const double *motion, double *reaction, double *pressure,
-                            silt_error *err) {
+silt_status silt_fluid_mode(silt_fluid *f, const silt_step *s, const double *motion, double *w, double *p, silt_error *err) {
     const int D = f->dim;
     const size_t n = (size_t)f->n_node, bytes = (size_t)D * n * sizeof(double);
-    double *own = silt_alloc((2 * (size_t)D + 1) * n + 1, sizeof *own); // sum of the increments, velocity, excess
-    double *p = own, *w = own + n, *excess = own + (1 + (size_t)D) * n, *force = reaction, first = 0;
+    double *excess = silt_alloc((size_t)D * n + 1, sizeof *excess), *force = f->reaction, first = 0;
     silt_status status = SILT_OK;
     // what does not hang on the velocity has no part in its change
     double *potential = f->potential;
     silt_seep *seep = f->seep;
     f->potential = NULL;
     f->seep = NULL;
+    memset(p, 0, n * sizeof *p);
     memcpy(w, motion, bytes);
     for (int i = 0; i < f->n_node; i++)
         for (int d = 0; d < D && !s->mesh->wet[i]; d++)
             w[D * i + d] = 0;
+    if (f->film)
+        silt_film_squeeze(f->film, D, motion, NULL);
     const int passes = f->ride ? MODE_SLIDES : MODE_PASSES;
     for (int pass = 0; pass < passes && status == SILT_OK; pass++) {
         memcpy(force, excess, bytes);
@@ -95,25 +96,32 @@ silt_status silt_fluid_mode(silt_fluid *f, const silt_step *s, const double *mot
             p[i] += f->increment[i];
         mode_excess(f, s, w, f->star, excess);
     }
-    memcpy(pressure, p, n * sizeof *pressure);
-    if (status == SILT_OK) {
-        memset(f->scratch, 0, bytes);
-        silt_assemble_viscous(f, s->mesh, w, 1, f->scratch);
-        memcpy(f->star, excess, bytes);
-        silt_assemble_pressure(f, s->mesh, p, f->star);
-        for (int i = 0; i < f->n_node; i++) {
-            double loose[3];
-            for (int d = 0; d < D; d++) {
-                const int k = D * i + d;
-                loose[d] = reaction[k] = s->mesh->wet[i] ? f->inertia[i] * w[k] + f->scratch[k] - f->star[k] : 0;
-            }
-            silt_hold_project(f, i, loose);
-            for (int d = 0; d < D; d++)
-                reaction[D * i + d] -= loose[d];
-        }
-    }
     f->potential = potential;
     f->seep = seep;
-    free(own);
+    free(excess);
     return status;
+}
+
+void silt_fluid_mode_answer(silt_fluid *f, const silt_step *s, const double *w, const double *p, double *force, double *rate) {
+    const int D = f->dim;
+    double *potential = f->potential, *nought = f->star;
+    silt_seep *seep = f->seep;
+    silt_film *film = f->film;
+    f->potential = NULL;
+    f->seep = NULL;
+    f->film = NULL;
+    mode_excess(f, s, w, f->star, force);
+    memset(f->scratch, 0, (size_t)(D * f->n_node) * sizeof(double));
+    silt_assemble_viscous(f, s->mesh, w, 1, f->scratch);
+    for (int i = 0; i < f->n_node; i++)
+        for (int d = 0; d < D; d++)
+            force[D * i + d] = s->mesh->wet[i] ? f->inertia[i] * w[D * i + d] + f->scratch[D * i + d] - force[D * i + d] : 0;
+    memset(nought, 0, (size_t)(D * f->n_node) * sizeof(double));
+    silt_assemble_projection(f, s->mesh, p);
+    silt_assemble_continuity(f, s->mesh, NULL, NULL, nought, p);
+    for (int i = 0; i < f->n_node; i++)
+        rate[i] = s->mesh->wet[i] ? f->residual[i] : 0;
+    f->potential = potential;
+    f->seep = seep;
+    f->film = film;
 }

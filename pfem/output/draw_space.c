@@ -27,12 +27,6 @@ static double space_dot(const double *a, const double *b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void space_cross(const double *a, const double *b, double *out) {
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
 static double space_unit(double *v) {
     const double length = sqrt(space_dot(v, v));
     for (int d = 0; d < 3 && length > 0; d++)
@@ -47,7 +41,7 @@ static void space_normal(const double *a, const double *b, const double *c, doub
         u[d] = b[d] - a[d];
         v[d] = c[d] - a[d];
     }
-    space_cross(u, v, normal);
+    silt_cross(u, v, normal);
 }
 
 static void space_axes(space *s) {
@@ -58,7 +52,7 @@ static void space_axes(space *s) {
     memcpy(s->eye, eye, sizeof eye);
     memcpy(s->right, right, sizeof right);
     memcpy(s->light, light, sizeof light);
-    space_cross(s->eye, s->right, s->up);
+    silt_cross(s->eye, s->right, s->up);
     space_unit(s->light);
 }
 

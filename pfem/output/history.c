@@ -98,12 +98,8 @@ static bool history_has(const silt_scene *scene, history_part part) {
     switch (part) {
     case PART_FLUID:
         return scene->fluid.on;
-    case PART_LAW: {
-        bool law = scene->bed.on && scene->bed.condition == WALL_LAW;
-        for (int k = 0; k < scene->n_wall; k++)
-            law |= scene->wall[k].condition == WALL_LAW;
-        return scene->fluid.on && law;
-    }
+    case PART_LAW:
+        return scene->fluid.on && silt_scene_law(scene);
     case PART_BED:
         return scene->bed.on;
     case PART_SEEPAGE:

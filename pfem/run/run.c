@@ -129,7 +129,7 @@ static silt_step water_see(silt_run *run) {
         step.body_shift = run->body_shift;
     }
     step.body_start = run->body_start;
-    step.gap_force = run->gaps ? run->gap_force : NULL;
+    step.film = run->film;
     return step;
 }
 
@@ -434,6 +434,7 @@ void silt_run_free(silt_run *run) {
     free(run->waiting);
     free(run->rest);
     free(run->owed);
+    free(run->pick);
     free(run->freed);
     free(run->freed_area);
     free(run->grown);
@@ -446,7 +447,6 @@ void silt_run_free(silt_run *run) {
     free(run->body_carry);
     free(run->body_water);
     silt_uplift_free(&run->uplift);
-    free(run->gap_force);
     free(run->x_old);
     free(run->p_old);
     free(run->p_shown);

@@ -61,6 +61,8 @@ struct silt_run {
     silt_rest *rest;       // owned, rising id
     int n_owed, owed_capacity;
     double *owed;          // owned, kg, one per inlet: what has come due and is less than a parcel; none where nothing is fed
+    int pick_capacity;
+    int *pick;             // owned, bed nodes that leave together
     int n_freed, freed_capacity;
     int (*freed)[4];       // owned, bed nodes of cells released in this step
     int freed_area_capacity;
@@ -96,10 +98,9 @@ struct silt_run {
     struct silt_body *body_before; // owned, poses at the start of the step
     int body_after_capacity, body_velocity_capacity, body_shift_capacity, body_carry_capacity;
     struct silt_body *body_after;  // owned, poses at its end, as far as they are known
-    double *body_velocity, *body_shift, *gap_force, *body_start; // owned, dim per node, see silt_step
+    double *body_velocity, *body_shift, *body_start; // owned, dim per node, see silt_step
     int body_start_capacity;
-    int gap_force_capacity;
-    bool gaps;                     // there are any
+    silt_film *film;               // borrowed from uplift, NULL: there is none
     silt_body_water *body_water;   // owned, in space with more bodies than one
     int body_water_capacity;
     double (*body_carry)[6];       // owned, N s and N m s per m: what the water gave bodies and they have not received yet
@@ -161,13 +162,9 @@ silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_erro
 silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_error *err);
 
 // uplift.c --------------------------------------------------------------------------------------------
-/** Where bodies have nothing of the water's mesh on them, but no air either; of the present mesh. Makes *uplift at first. Nodes at
- * mouths that are shut are no free surface any more, until silt_uplift_open. */
-void silt_uplift_find(silt_uplift **uplift, silt_run *run);
-/** out, 6 numbers a body: += factor times force and torque of the pressure there, from p of the nodes around */
-void silt_uplift_force(const silt_uplift *uplift, const silt_run *run, const double *p, double factor, double *out);
-/** out, 2 per node: the pressure there on the water's nodes at its mouths. @return false: there are none */
-bool silt_uplift_mouths(const silt_uplift *uplift, const silt_run *run, double *out);
+/** Films of water between bodies and what they are near to, of the present mesh and places. Makes *uplift at first. Nodes at mouths that
+ * are shut are no free surface any more, until silt_uplift_open. @return borrowed from it; NULL: there are none */
+silt_film *silt_uplift_find(silt_uplift **uplift, silt_run *run);
 void silt_uplift_open(const silt_uplift *uplift, silt_run *run); // the step is over
 void silt_uplift_free(silt_uplift **uplift);
 

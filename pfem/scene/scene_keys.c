@@ -17,7 +17,6 @@ static const silt_word scheme_words[] = {{"implicit", SCHEME_IMPLICIT}, {"fracti
 static const silt_word pressure_words[] = {{"consistent", PRESSURE_CONSISTENT}, {"laplacian", PRESSURE_LAPLACIAN}, {0}};
 static const silt_word condition_words[] = {
     {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
-static const silt_word body_condition_words[] = {{"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {0}};
 static const silt_word wall_condition_words[] = {
     {"default", WALL_DEFAULT}, {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
 static const silt_word flow_words[] = {{"turbulent", FLOW_TURBULENT}, {"laminar", FLOW_LAMINAR}, {0}};
@@ -387,9 +386,9 @@ static const silt_key bed_rows[] = {
     {"porosity", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_bed_def, porosity), .doc = "share of pores"},
     {"law", KEY_WORD, .flags = KEY_SELECTOR, .fallback = "frictional-work", .words = law_words, AT(silt_bed_def, law),
      .doc = "how fast the water wears the bed; see docs/bed.md"},
-    {"work", KEY_NUMBER, .unit = "J/m3", .flags = KEY_OPEN_LOW | KEY_INFINITE, RANGE(0, HUGE_VAL),
+    {"work", KEY_NUMBER, .unit = "J/m3", .flags = KEY_INFINITE, RANGE(0, HUGE_VAL),
      AT(silt_bed_def, work), .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION) | ONLY(BED_POWER),
-     .doc = "W_c, frictional work that loosens the bed; .inf: never. A constant of law, mesh and water, not of the soil: at a rate of "
+     .doc = "W_c, frictional work that loosens the bed; 0: whatever water wears it, a layer a step; .inf: never. A constant of law, mesh and water, not of the soil: at a rate of "
             "E m/s under tau it is h_b tau^2/(viscosity E), h_b the patch height; power: (tau - threshold) u*/E"},
     {"erodibility", KEY_NUMBER, .unit = "m3/(N s)", POSITIVE, AT(silt_bed_def, erodibility), .when = ONLY(BED_EXCESS_SHEAR),
      .doc = "k_d of E = k_d (tau - threshold); Hanson and Simon: 2e-7 threshold^-0.5"},
@@ -579,8 +578,12 @@ static const silt_key body_rows[] = {
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_body_def, velocity), .doc = "at the start"},
     {"spin", KEY_POINT, .unit = "rad/s", .flags = KEY_SPACE, .fallback = "[0, 0, 0]", AT(silt_body_def, spin),
      .doc = "angular velocity at the start"},
-    {"condition", KEY_WORD, .fallback = "no-slip", .words = body_condition_words, AT(silt_body_def, condition),
-     .doc = "of the water at its surface; slip: it goes with the surface's normal only, but sticks to edges, at waterlines and in films of one cell; not for bodies that strike walls"},
+    {"condition", KEY_WORD, .fallback = "default", .words = wall_condition_words, AT(silt_body_def, condition),
+     .doc = "of the water at its surface. slip and wall-law: it goes with the surface's normal only, but sticks to edges, at waterlines and in "
+            "films of one cell. default: wall-law where fluid.flow is turbulent; where it is laminar no-slip if cells show the layer that sticks, "
+            "viscosity/density sqrt(10 h/g) > h^2 with the least size h near bodies, else slip"},
+    {"roughness", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_body_def, roughness),
+     .doc = "equivalent sand roughness of the wall law; 0: smooth"},
     {"motion", KEY_WORD, .fallback = "free", .words = motion_words, AT(silt_body_def, motion),
      .doc = "free to move, held where it is, or moved by `path` whatever acts on it"},
     {"path", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_body_def, path),
@@ -623,6 +626,8 @@ static const silt_key gauge_rows[] = {
      AT(silt_gauge_def, from), .doc = "height of the bed at this x (3-D: [x, y])"},
     {"scour_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_SCOUR,
      AT(silt_gauge_def, from), .doc = "how deep the bed lies under its level at the start, at this x (3-D: [x, y])"},
+    {"bed_lowest", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_BED_LOWEST,
+     AT(silt_gauge_def, from), .doc = "height of the lowest place of the bed's surface between these two x"},
     {"extent", KEY_SIGN, .flags = KEY_CHOICE, .words = extent_words, .select = GAUGE_EXTENT, AT(silt_gauge_def, from),
      .doc = "length of connected water along this axis, m"},
     {"grains_front", KEY_SIGN, .flags = KEY_CHOICE, .words = front_words, .select = GAUGE_GRAIN_FRONT, AT(silt_gauge_def, from),
