@@ -71,7 +71,7 @@ run ten-tetrapods tetrapods/scene.yaml
 page dam-break 1.16 2900
 page temple 7 1900
 page earth-dam 4 2500 --slice y=0.4
-page ten-tetrapods 0.75 2500 --slice y=0.15
+page ten-tetrapods 0.75 1900
 
 picture dam-break a 15
 picture dam-break b 58

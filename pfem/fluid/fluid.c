@@ -7,7 +7,7 @@
 #define FLUID_DAMPED 10.0   // mu dt/(rho h^2) above which the trapezoidal rule would let the shortest modes ring on and on
 #define FLUID_CLOSURE 2     // how often a step looks at the eddy viscosity again: it is smooth, and halved steps towards it end slowly
 #define FLUID_AGAIN 10      // iterations of a step that is solved again, at least: to cut it now costs LIGGGHTS' step too
-#define FLUID_IMPACT  0.1   // energy that the first projection may give, over that of the water at bodies' nodes, before it is an impact
+#define FLUID_IMPACT 1.0    // energy that the first projection may give, over that of the water at bodies' nodes, before it is an impact
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
 #define FLUID_INNER 1e4     // accuracy of a pressure increment over that of the step, at least: refreshes are counted, so what an
