@@ -402,7 +402,7 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
     run->summary.steps++;
     run->whole = true;
     run->back = run->step;
-    run->back_set_up = silt_run_set_up_due(run) ? run->step : run->back_set_up;
+    run->back_set_up = silt_run_set_up_due(run, run->dt) ? run->step : run->back_set_up;
     double seconds[CLOCK_COUNT];
     silt_clock_read(seconds);
     run->output_seconds = seconds[CLOCK_output];
