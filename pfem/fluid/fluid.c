@@ -422,6 +422,8 @@ static silt_status start_or_impact(silt_fluid *f, const silt_step *s, const doub
         }
     f->projected = 0;
     f->theta = 1;
+    if (f->blow)
+        memset(f->blow, 0, bytes);
     silt_assemble_geometry(f, s, s->dt);
     SILT_CLOCKED(matrix, status = silt_pressure_factor(f->pressure, f, s, err));
     return status;
