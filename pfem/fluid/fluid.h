@@ -1,6 +1,6 @@
 /** @file fluid.h
  * One step of the water: momentum, pressure, correction on the midpoint mesh (docs/method.md, "Fluid"), in 2-D and 3-D.
- * Rooms: fluid.c the step, converge.c how far it is, impedance.c what it answers to rigid bodies, hold.c what surroundings hold, geometry.c shapes of the cells, assemble.c integrals over them,
+ * Rooms: fluid.c the step, start.c the velocity it starts from, converge.c how far it is, impedance.c what it answers to rigid bodies, hold.c what surroundings hold, geometry.c shapes of the cells, assemble.c integrals over them,
  * tension.c the surface's pull, momentum.c the viscous system, pressure.c the pressure system, space.c and coarse.c that of 3-D,
  * stiff.c both at once where viscosity is stiff, debt.c volume that is owed and water that cannot keep its volume.
  */
@@ -273,6 +273,17 @@ double silt_mode_work(const silt_fluid *fluid, const silt_mode *a, const silt_mo
 void silt_mode_clear(silt_mode *mode);
 
 // fluid.c
+/** increment = -matrix^-1 residual, in 3-D to `tolerance`, or to what is worth having where the step is solved far; seeps: it is a
+ * pressure, which the bed answers, not an impulse or the way that debts are paid */
+silt_status silt_fluid_increment(silt_fluid *fluid, const silt_step *step, bool seeps, double tolerance, silt_error *err);
+
+/** whether the node starts with its body's velocity, and not with that of the step */
+static inline bool silt_fluid_own_start(const silt_step *step, int i) { return step->body_velocity && step->nodes->kind[i] == NODE_BODY; }
+
+/** start.c: makes the velocity at the start free of divergence, into nodes->v and fluid->w; where a body has just met the water the step
+ * becomes backward Euler's from the start as it is. p: Pa, per node, at the start */
+silt_status silt_fluid_start(silt_fluid *fluid, const silt_step *step, const double *p, silt_error *err);
+
 /** v += P G q/inertia */
 void silt_fluid_correct(silt_fluid *fluid, const silt_step *step, const double *q, double *v);
 
