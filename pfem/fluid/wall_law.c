@@ -112,7 +112,7 @@ static double volume6(const double *a, const double *b, const double *c, const d
         v[k] = c[k] - a[k];
         w[k] = d[k] - a[k];
     }
-    return u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
+    return silt_triple(u, v, w);
 }
 
 // barycentric weights of a point in a cell; false when the cell is flat

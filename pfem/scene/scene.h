@@ -369,6 +369,7 @@ typedef enum {
     GAUGE_GRAIN_FORCE,    // grain_force: K: of its contacts
     GAUGE_GRAINS,     // grains_in: [[x, y], [x, y]] (3-D: three each): of the grains there NAME_x, NAME_y, NAME_z, NAME_m (mass)
     GAUGE_DEPTH,      // depth_at: X (3-D: [x, y]): how much of the vertical there is in water
+    GAUGE_BED_LOWEST, // bed_lowest: [x0, x1]: the lowest place of the bed's surface from x0 = from[0] to x1 = from[1]
 } silt_gauge_kind;
 typedef struct silt_gauge_def {
     char *name; // column name(s) in history.csv
@@ -447,6 +448,10 @@ struct silt_scene {
         int64_t steps;         // most steps, 0: no limit
         int retries;           // how often a failed step is halved
     } time;
+    struct {
+        bool on;                     // the block was there; the numbers always are
+        double volume, mass, energy; // shares that a run may be off by before it says so (silt_bounds)
+    } bounds;
     double gravity[3];
     silt_fluid_def fluid;
     int n_wall;
@@ -506,6 +511,13 @@ static inline const silt_grain_def *silt_scene_grain(const silt_scene *s, int i)
 static inline bool silt_body_slips(const silt_body_def *body) { return body->condition != WALL_NO_SLIP; }
 /** whether something in the scene has the law of the wall (scene_settle.c) */
 bool silt_scene_law(const silt_scene *s);
+/** how many of its bodies move */
+static inline int silt_scene_moves(const silt_scene *s) {
+    int n = 0;
+    for (int i = 0; i < s->n_body; i++)
+        n += s->body[i].motion != MOTION_FIXED;
+    return n;
+}
 
 /** what a scene needs */
 static inline bool silt_scene_has_dem(const silt_scene *s) { return s->grains.on || s->n_body > 0; }

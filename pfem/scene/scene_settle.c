@@ -474,6 +474,11 @@ static void settle_fills(silt_reader *reader, silt_scene *scene) {
 }
 
 void silt_scene_settle(silt_reader *reader, silt_scene *scene) {
+    if (!scene->bounds.on) {
+        scene->bounds.volume = strtod(BOUNDS_VOLUME, NULL);
+        scene->bounds.mass = strtod(BOUNDS_MASS, NULL);
+        scene->bounds.energy = strtod(BOUNDS_ENERGY, NULL);
+    }
     settle_regions(reader, scene);
     for (int i = 0; i < scene->n_wall; i++)
         settle_wall(reader, scene, &scene->wall[i], i);
