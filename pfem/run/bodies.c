@@ -123,6 +123,7 @@ void silt_run_bodies_coast(silt_run *run) {
         run->body_after[b] = coasting(&bodies->body[b], run->dt);
     }
     run->film = silt_uplift_find(&run->uplift, run);
+    silt_uplift_owe(run->uplift, run);
     node_motion(run, run->body_before, run->body_after, 1);
 }
 
