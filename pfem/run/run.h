@@ -166,6 +166,13 @@ silt_status silt_run_bodies_inertia(silt_run *run, const silt_step *step, int *s
  * from what they received is carried to the next step. */
 silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_error *err);
 
+// matrix.c --------------------------------------------------------------------------------------------
+/** Cholesky's factor of a symmetric matrix in its lower triangle; @return false: it is not positive definite */
+bool silt_cholesky(int n, double *a);
+void silt_cholesky_solve(int n, const double *factor, double *x);
+/** The symmetric part of a matrix without what of it is less than nought. @return how many of its values were */
+int silt_matrix_clip(int n, double *a);
+
 // uplift.c --------------------------------------------------------------------------------------------
 /** Films of water between bodies and what they are near to, of the present mesh and places. Makes *uplift at first. Nodes at mouths that
  * are shut are no free surface any more, until silt_uplift_open. @return borrowed from it; NULL: there are none */
