@@ -7,6 +7,7 @@ static const double parcel_usual = 0.75;                   // radius that the ti
 static const double room_overlap = 0.01;                   // of the radius
 static const double heap_porosity = 0.4;                   // of what fills the regions, when it has settled
 static const double period_share = 3.2;                    // slab thickness over the largest sphere's diameter
+static const double period_pieces = 2000;                  // walls are cut into pieces as long as the slab is thick: about as many at most
 
 static void coupling_close(silt_coupling **coupling);
 
@@ -32,6 +33,15 @@ double silt_coupling_burden(const silt_coupling *c, const coupling_grain *g) {
         return 1.0;
     double sphere = 4.0 / 3.0 * M_PI * crumb * crumb * crumb * g->mass / g->solid;
     return silt_max(1.0, sphere / (g->mass * c->width));
+}
+
+// Thickness of the slab in the plane. Its walls are strips of triangles no longer than it: of a small grain in a large tank there would be
+// millions of them, and as many bins. Nothing moves across it, so that it may be thicker.
+static double coupling_period(const silt_walls *walls, double largest) {
+    double length = 0.0;
+    for (int i = 0; i < walls->count; i++)
+        length += hypot(walls->to[i][0] - walls->from[i][0], walls->to[i][1] - walls->from[i][1]);
+    return silt_max(period_share * 2.0 * largest, length / period_pieces);
 }
 
 // widths, radii, time step and everything else that the worker is told once
@@ -120,7 +130,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .way_hi = {def->way_hi[0], def->way_hi[1], def->way_hi[2]},
         .periodic = periodic,
         .across = grains->across,
-        .period = period_share * 2.0 * largest,
+        .period = space ? 0.0 : coupling_period(c->walls, largest),
         .gravity = {scene->gravity[0], scene->gravity[1], scene->gravity[2]},
         .youngs_modulus = contact->youngs_modulus,
         .wall_modulus = contact->wall_modulus,
@@ -149,7 +159,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
 
 // grains came, went or moved: what was made of them is out of date
 static void coupling_touched(silt_coupling *c) {
-    c->found = c->view->fresh = false;
+    c->found = c->view->fresh = c->crowds->fresh[0] = false;
 }
 
 static coupling_grain *coupling_append(silt_coupling *c, const double *x, const double *v, double radius) {
@@ -260,6 +270,7 @@ static void coupling_release(silt_coupling *c, int n, const silt_release *releas
 static void coupling_deposit(silt_coupling *c, int grain) {
     coupling_grain *g = &c->grain[c->view->map[grain]];
     silt_frozen_add(&c->frozen, g->x, g->radius, &c->next_id);
+    c->crowds->fresh[1] = false;
     coupling_take(c, g);
 }
 
@@ -271,17 +282,34 @@ static double coupling_wall_distance(const silt_walls *walls, int i, const doubl
     return hypot(d[0] - t * e[0], d[1] - t * e[1]);
 }
 
-static double coupling_apart(const silt_coupling *c, const double *x, const double *y) {
-    return hypot(hypot(x[0] - y[0], x[1] - y[1]), c->dim == 3 ? x[2] - y[2] : 0.0);
+// bins as wide as the usual sphere
+static const silt_crowd *coupling_moving(const silt_coupling *c) {
+    silt_crowd *crowd = &c->crowds->moving;
+    if (c->crowds->fresh[0])
+        return crowd;
+    silt_crowd_start(crowd, 2.0 * (c->parcel > 0.0 ? c->parcel : c->dem_def.max_radius));
+    for (int i = 0; i < c->n_grain; i++)
+        if (!c->grain[i].gone)
+            silt_crowd_add(crowd, c->grain[i].x, c->grain[i].radius);
+    c->crowds->fresh[0] = true;
+    return crowd;
+}
+
+static const silt_crowd *coupling_crust(const silt_coupling *c) {
+    silt_crowd *crowd = &c->crowds->frozen;
+    if (c->crowds->fresh[1])
+        return crowd;
+    silt_crowd_start(crowd, 2.0 * (c->crust > 0.0 ? c->crust : c->dem_def.max_radius));
+    for (int i = 0; i < c->frozen.count; i++)
+        silt_crowd_add(crowd, c->frozen.sphere[i].x, c->frozen.sphere[i].radius);
+    c->crowds->fresh[1] = true;
+    return crowd;
 }
 
 // free distance from a point to grains and bodies
-static double coupling_gap(const void *context, const double *x) {
+static double coupling_gap(const void *context, const double *x, double far) {
     const silt_coupling *c = context;
-    double gap = HUGE_VAL;
-    for (int i = 0; i < c->n_grain; i++)
-        if (!c->grain[i].gone)
-            gap = silt_min(gap, coupling_apart(c, x, c->grain[i].x) - c->grain[i].radius);
+    double gap = silt_crowd_gap(coupling_moving(c), x, far);
     for (int i = 0; i < c->bodies->count; i++)
         gap = silt_min(gap, silt_coupling_body_distance(c, i, x, gap));
     return gap;
@@ -289,13 +317,8 @@ static double coupling_gap(const void *context, const double *x) {
 
 static bool coupling_room(const silt_coupling *c, const double *x, double radius) {
     double need = (1.0 - room_overlap) * radius;
-    if (coupling_gap(c, x) < need)
+    if (coupling_gap(c, x, need) < need || silt_crowd_gap(coupling_crust(c), x, need) < need)
         return false;
-    for (int i = 0; i < c->frozen.count; i++) {
-        const silt_frozen_sphere *s = &c->frozen.sphere[i];
-        if (coupling_apart(c, x, s->x) - s->radius < need)
-            return false;
-    }
     if (c->dim == 3)
         return c->walls->count == 0 || silt_walls_distance(c->walls, x, &(int){0}) >= need;
     for (int i = 0; i < c->walls->count; i++)
@@ -306,6 +329,7 @@ static bool coupling_room(const silt_coupling *c, const double *x, double radius
 
 static void coupling_bed_changed(silt_coupling *c, const silt_bed *bed) {
     silt_frozen_update(&c->frozen, bed, c->crust, &c->next_id, coupling_gap, coupling_forget, c);
+    c->crowds->fresh[1] = false;
 }
 
 // ---------------------------------------------------------------- exchange with the water
@@ -572,6 +596,7 @@ static silt_status coupling_create(silt_coupling **coupling, const silt_coupling
     c->dim = def->scene->dimension == 3 ? 3 : 2;
     c->next_id = c->sent_id = 1;
     c->view = silt_alloc(1, sizeof *c->view);
+    c->crowds = silt_alloc(1, sizeof *c->crowds);
     SILT_TRY(silt_coupling_bodies(c, err));
     coupling_measure(c, def);
     return silt_trace_open(c, def->trace, def->resumed, def->walls->time, err);
@@ -657,6 +682,9 @@ static void coupling_close(silt_coupling **coupling) {
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     silt_frozen_clear(&c->frozen);
+    silt_crowd_clear(&c->crowds->moving);
+    silt_crowd_clear(&c->crowds->frozen);
+    free(c->crowds);
     silt_exchange_clear(&c->exchange);
     silt_locator_clear(&c->locator);
     free(c);

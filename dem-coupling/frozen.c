@@ -129,7 +129,7 @@ void silt_frozen_update(silt_frozen *f, const silt_bed *bed, double radius, int6
         double *at = NULL;
         const int n = edge->node[2] < 0 ? frozen_along(edge, radius, &at) : frozen_under(edge, radius, &at);
         for (int k = 0; k < n; k++) {
-            double r = silt_min(radius, gap(context, at + 3 * k) + frozen_overlap * radius);
+            double r = silt_min(radius, gap(context, at + 3 * k, radius) + frozen_overlap * radius);
             if (r < frozen_least * radius)
                 continue;
             silt_frozen_sphere *s = frozen_append(f, at + 3 * k, r, next_id);

@@ -22,8 +22,8 @@ typedef struct silt_frozen {
     struct silt_frozen_edge *edge; // owned, scratch of an update
 } silt_frozen;
 
-/** free distance in m from x to whatever moves: a new frozen sphere is made smaller rather than pushed into it */
-typedef double (*silt_frozen_gap)(const void *context, const double *x);
+/** free distance in m from x to whatever moves, `far` where it is more: a new frozen sphere is made smaller rather than pushed into it */
+typedef double (*silt_frozen_gap)(const void *context, const double *x, double far);
 /** told of a sphere that goes and that the discrete elements know */
 typedef void (*silt_frozen_drop)(void *context, int64_t id);
 

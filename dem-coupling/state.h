@@ -6,6 +6,7 @@
 
 #include "coupling.h"
 
+#include "crowd.h"
 #include "dem.h"
 #include "exchange.h"
 #include "frozen.h"
@@ -52,6 +53,12 @@ typedef struct coupling_view {
     uint8_t *on_bed;
 } coupling_view;
 
+/** grains and frozen spheres by place, remade when they are asked for and stale */
+typedef struct coupling_crowds {
+    bool fresh[2];
+    silt_crowd moving, frozen;
+} coupling_crowds;
+
 typedef struct coupling_body {
     silt_outline shape;  // in the plane
     silt_solid form;     // in space: as fine as the shape asks for
@@ -92,6 +99,7 @@ struct silt_coupling {
     coupling_grain *grain;               // owned, rising id
     bool found;                          // the exchange has these grains where they are
     coupling_view *view;   // owned
+    coupling_crowds *crowds; // owned
     silt_frozen frozen;
     int n_drop, drop_capacity;
     int64_t *drop; // owned, ids that LIGGGHTS is to forget

@@ -2,6 +2,8 @@
 
 #include "bed_bench.h"
 
+#include "crowd.h"
+
 // ---------------------------------------------------------------- creation
 
 static void check_created(bench *b, double area) {
@@ -459,6 +461,37 @@ static void test_loose(void **state) {
     }
 }
 
+// ---------------------------------------------------------------- spheres by place
+
+// the free distance is that to the nearest of all, in the plane and in space, for crumbs among boulders too
+static void test_crowd(void **state) {
+    (void)state;
+    enum { SPHERES = 1500 };
+    static double x[SPHERES][3], radius[SPHERES];
+    uint64_t seed = 4;
+    int inside = 0, beyond = 0;
+    for (int kind = 0; kind < 4; kind++) {
+        silt_crowd crowd = {0};
+        silt_crowd_start(&crowd, kind < 2 ? 0.02 : 0.5);
+        for (int k = 0; k < SPHERES; k++) {
+            for (int d = 0; d < 3; d++)
+                x[k][d] = d == 2 && kind % 2 == 0 ? 0 : 2 * silt_uniform(&seed) - 1;
+            radius[k] = k % 100 == 0 ? 0.1 : 0.002 + 0.02 * silt_uniform(&seed);
+            silt_crowd_add(&crowd, x[k], radius[k]);
+            const double at[3] = {3 * silt_uniform(&seed) - 1.5, 3 * silt_uniform(&seed) - 1.5, kind % 2 == 0 ? 0 : 3 * silt_uniform(&seed) - 1.5};
+            const double far = k % 7 == 0 ? 10 : 0.1 * silt_uniform(&seed);
+            double gap = far;
+            for (int m = 0; m <= k; m++)
+                gap = silt_min(gap, hypot(hypot(at[0] - x[m][0], at[1] - x[m][1]), at[2] - x[m][2]) - radius[m]);
+            assert_true(silt_crowd_gap(&crowd, at, far) == gap);
+            inside += gap < 0;
+            beyond += gap == far;
+        }
+        silt_crowd_clear(&crowd);
+    }
+    assert_true(inside > 100 && beyond > 1000);
+}
+
 int main(void) {
     const struct CMUnitTest test[] = {
         cmocka_unit_test(test_create_box),
@@ -474,6 +507,7 @@ int main(void) {
         cmocka_unit_test(test_release_all),
         cmocka_unit_test(test_release_excess),
         cmocka_unit_test(test_loose),
+        cmocka_unit_test(test_crowd),
     };
     return cmocka_run_group_tests(test, NULL, NULL);
 }

@@ -583,6 +583,40 @@ static void test_mixed(void **state) {
     close3(&b);
 }
 
+// ---------------------------------------------------------------- many at once
+
+// what leaves one by one and what leaves together, with one refresh, leaves the same bed, to the bit
+static void test_together(void **state) {
+    (void)state;
+    bench3 one, all;
+    uint64_t seed[2] = {5, 5};
+    silt_patch patch;
+    dam3(&one, 0.1);
+    dam3(&all, 0.1);
+    for (int round = 0; round < 6; round++) {
+        for (int m = 0; m < 12 && one.bed.n_cell > 0; m++) {
+            silt_bed_patch(&one.bed, any_node(&one.bed, &seed[0]), &patch);
+            silt_bed_release(&one.bed, &one.scene, &patch);
+            silt_bed_patch(&all.bed, any_node(&all.bed, &seed[1]), &patch);
+            silt_bed_take_out(&all.bed, &all.scene, &patch);
+        }
+        silt_bed_refresh(&all.bed);
+        const silt_bed *p = &one.bed, *q = &all.bed;
+        assert_int_equal(p->n_cell, q->n_cell);
+        assert_int_equal(p->n_edge, q->n_edge);
+        assert_memory_equal(p->cell, q->cell, (size_t)p->n_cell * sizeof *p->cell);
+        assert_memory_equal(p->mass, q->mass, (size_t)p->n_cell * sizeof *p->mass);
+        assert_memory_equal(p->edge, q->edge, (size_t)p->n_edge * sizeof *p->edge);
+        assert_memory_equal(p->exposed, q->exposed, (size_t)p->n_node * sizeof *p->exposed);
+        assert_memory_equal(p->eroded, q->eroded, (size_t)p->n_node * sizeof *p->eroded);
+        assert_true(p->solid_mass == q->solid_mass && p->pore_water == q->pore_water);
+        check3(&all);
+    }
+    assert_true(one.bed.solid_mass < 0.5 * one.bed.initial_mass);
+    close3(&one);
+    close3(&all);
+}
+
 // ---------------------------------------------------------------- save and load
 
 static void test_store(void **state) {
@@ -642,7 +676,8 @@ static void test_store(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_create),  cmocka_unit_test(test_inside),  cmocka_unit_test(test_patch), cmocka_unit_test(test_release),
-        cmocka_unit_test(test_loose), cmocka_unit_test(test_deposit), cmocka_unit_test(test_heap), cmocka_unit_test(test_mixed), cmocka_unit_test(test_store),
+        cmocka_unit_test(test_loose), cmocka_unit_test(test_deposit), cmocka_unit_test(test_heap), cmocka_unit_test(test_mixed), cmocka_unit_test(test_together),
+        cmocka_unit_test(test_store),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -233,17 +233,19 @@ static void test_gauges(void **state) {
         {.name = "bed", .kind = GAUGE_BED_LEVEL, .from = {0.5}},
         {.name = "no_bed", .kind = GAUGE_BED_LEVEL, .from = {5}},
         {.name = "scour", .kind = GAUGE_SCOUR, .from = {0.5}},
+        {.name = "lowest", .kind = GAUGE_BED_LOWEST, .from = {0.2, 0.6}},
+        {.name = "no_lowest", .kind = GAUGE_BED_LOWEST, .from = {5, 6}},
     };
     world w;
     silt_error err = {0};
     silt_gauges *gauges = NULL;
-    double value[18];
+    double value[20];
     char name[64];
     world_make(&w);
     w.view.bed = &w.bed;
     w.scene.gauge = def;
     w.scene.n_gauge = sizeof def / sizeof def[0];
-    assert_int_equal(silt_gauges_count(&w.scene), 18);
+    assert_int_equal(silt_gauges_count(&w.scene), 20);
     silt_gauges_name(&w.scene, 8, name);
     assert_string_equal(name, "p_dry");
     silt_gauges_name(&w.scene, 10, name);
@@ -254,8 +256,8 @@ static void test_gauges(void **state) {
     assert_int_equal(silt_gauges_create(&gauges, &w.view, &err), SILT_OK);
     bed_x[1][1] = -0.7; // the bed's crest sinks
     silt_gauges_read(gauges, &w.view, value);
-    const double want[] = {1, 0, 1, NAN, 1, 0, 7.25, 8, NAN, 1.5, 2.25, 0, 2, -2, 0.5, -0.85, NAN, 0.1};
-    for (int i = 0; i < 18; i++) {
+    const double want[] = {1, 0, 1, NAN, 1, 0, 7.25, 8, NAN, 1.5, 2.25, 0, 2, -2, 0.5, -0.85, NAN, 0.1, -0.94, NAN};
+    for (int i = 0; i < 20; i++) {
         if (isnan(want[i]))
             assert_true(isnan(value[i]));
         else
@@ -321,7 +323,7 @@ static void test_history_columns(void **state) {
     assert_int_equal(silt_history_close(&history, &err), SILT_OK);
     assert_string_equal(content("history.csv"),
                         WATER "bed_mass,released_mass,deposited_mass,pore_water_mass,bed_shear,bed_work,bed_y_plus,grain_count,grain_mass," GRAIN_FORCES
-                              "sediment_error,left_mass,inflow_mass,outflow_mass,block_x,block_y,block_z,block_vx,"
+                              "sediment_error,left_mass,body_kinetic_energy,body_potential_energy,inflow_mass,outflow_mass,block_x,block_y,block_z,block_vx,"
                               "block_vy,block_vz,block_qw,block_qx,block_qy,block_qz,block_wx,block_wy,block_wz,"
                               "block_fx,block_fy,block_fz,block_tx,block_ty,block_tz,block_cx,block_cy,block_cz,"
                               "v_x,v_y,v_z,q," WALLS);

@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 
+#include "check.h"
 #include "run.h"
 
 #include <unistd.h>
@@ -18,16 +19,13 @@ static char folder[512];
 
 // a scene of the tree, with what is set in it, at its start in a folder of its own
 static void begin(silt_run *run, silt_scene **scene, const char *path, int n_set, const char *const *set) {
-    silt_error err = {0};
     silt_run_def def = {.quiet = true};
     char full[1024];
     snprintf(full, sizeof full, "%s/%s", SILT_SOURCE, path);
-    if (silt_scene_read(full, n_set, set, scene, &err) != SILT_OK)
-        fail_msg("%s", err.text);
+    OK(silt_scene_read(full, n_set, set, scene, &error));
     snprintf(folder, sizeof folder, "%s/tests/run-XXXXXX", SILT_BINARY);
     assert_non_null(mkdtemp(folder));
-    if (silt_run_open(run, *scene, &def, folder, -1, &err) != SILT_OK)
-        fail_msg("%s", err.text);
+    OK(silt_run_open(run, *scene, &def, folder, -1, &error));
 }
 
 static void end(silt_run *run, silt_scene **scene) {
@@ -46,13 +44,6 @@ static void steps(silt_run *run, int n) {
     for (int k = 0; k < n; k++)
         if (silt_run_advance(run, &err) != SILT_OK)
             fail_msg("step %d: %s", k, err.text);
-}
-
-static bool zero(const void *data, size_t size) {
-    for (size_t k = 0; k < size; k++)
-        if (((const char *)data)[k])
-            return false;
-    return true;
 }
 
 // ---------------------------------------------------------------- water alone
@@ -286,6 +277,77 @@ static void test_failed_step_thrown(void **state) {
     fails_and_leaves("tests/scenes/drum.yaml", 0, NULL, 12, 6, true);
 }
 
+// ---------------------------------------------------------------- release
+
+// of spheres of rising x: the deepest overlap, of the smaller radius
+typedef struct ball {
+    double x[3], radius;
+} ball;
+
+static int ball_order(const void *a, const void *b) {
+    const ball *p = a, *q = b;
+    return (p->x[0] > q->x[0]) - (p->x[0] < q->x[0]);
+}
+
+static double overlap_most(int n, ball *list) {
+    double most = 0, largest = 0;
+    qsort(list, (size_t)n, sizeof *list, ball_order);
+    for (int i = 0; i < n; i++)
+        largest = silt_max(largest, list[i].radius);
+    for (int i = 0; i < n; i++)
+        for (int j = i + 1; j < n && list[j].x[0] - list[i].x[0] < 2 * largest; j++) {
+            const double apart = hypot(hypot(list[i].x[0] - list[j].x[0], list[i].x[1] - list[j].x[1]), list[i].x[2] - list[j].x[2]);
+            most = silt_max(most, (list[i].radius + list[j].radius - apart) / silt_min(list[i].radius, list[j].radius));
+        }
+    return most;
+}
+
+// A bed of 1e4 patches is due at once: all of it leaves, to the last bit, as spheres that do not touch
+static void release_at_once(const char *work, const char *per_patch, const char *parcel, int least) {
+    silt_run run;
+    silt_scene *scene;
+    begin(&run, &scene, "tests/scenes/release.yaml", 3, (const char *const[]){work, per_patch, parcel});
+    const double whole = run.bed.solid_mass;
+    int exposed = 0;
+    for (int k = 0; k < run.bed.n_node; k++)
+        if (run.bed.exposed[k]) {
+            run.bed.work[k] = 2e-3;
+            exposed++;
+        }
+    assert_in_range(exposed, 10000, 10001);
+    silt_run_release(&run);
+    assert_int_equal(run.bed.n_cell, 0);
+    assert_int_equal(run.bed.n_edge, 0);
+    assert_true(run.bed.solid_mass == 0 && fabs(run.ledger.released_mass - whole) <= 1e-15 * whole);
+    assert_in_range(run.n_waiting, least, 10 * least);
+
+    // those that found no room wait: they and the others are the bed's mass
+    silt_run_place(&run);
+    const silt_grain_state *grains = silt_coupling_dem.grains(run.coupling);
+    double mass = 0, rest = 0;
+    ball *place = silt_alloc((size_t)grains->count + 1, sizeof *place);
+    for (int k = 0; k < grains->count; k++) {
+        silt_sum(&mass, &rest, grains->mass[k]);
+        memcpy(place[k].x, grains->x + 3 * k, sizeof place[k].x);
+        place[k].radius = grains->radius[k];
+        int element;
+        assert_true(silt_walls_distance(&run.walls, place[k].x, &element) >= place[k].radius);
+    }
+    for (int k = 0; k < run.n_waiting; k++)
+        silt_sum(&mass, &rest, run.waiting[k].mass);
+    assert_true(fabs(mass - whole) <= 1e-14 * whole);
+    assert_in_range(grains->count, 9 * least / 10, 10 * least);
+    assert_true(overlap_most(grains->count, place) <= 0.01);
+    free(place);
+    end(&run, &scene);
+}
+
+static void test_release_at_once(void **state) {
+    (void)state;
+    release_at_once("bed.work=0", "grains.per_patch=1", "grains.parcel=0.006", 9800);
+    release_at_once("bed.work=1.0e-3", "grains.per_patch=4", "grains.parcel=0.003", 39000);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_water_alone),
@@ -293,6 +355,7 @@ int main(void) {
         cmocka_unit_test(test_failed_step_coupled),
         cmocka_unit_test(test_failed_step_prescribed),
         cmocka_unit_test(test_failed_step_thrown),
+        cmocka_unit_test(test_release_at_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

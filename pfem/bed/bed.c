@@ -36,7 +36,7 @@ void silt_bed_patch(const silt_bed *bed, int node, silt_patch *patch) {
 
 // ---------------------------------------------------------------- release
 
-void silt_bed_release(silt_bed *bed, const silt_scene *scene, const silt_patch *patch) {
+void silt_bed_take_out(silt_bed *bed, const silt_scene *scene, const silt_patch *patch) {
     if (patch->n_cell == 0)
         return;
     silt_bed_heirs heirs;
@@ -58,10 +58,17 @@ void silt_bed_release(silt_bed *bed, const silt_scene *scene, const silt_patch *
             if (silt_bed_cell_at(bed, turned) >= 0)
                 silt_bed_edge_add(bed, scene, turned);
         }
-    silt_bed_refresh(bed);
+    silt_bed_refresh_nodes(bed, heirs.count, heirs.node);
     silt_sum(&bed->pore_water, &bed->pore_rest,
              scene->bed.saturation * (patch->area - patch->mass / scene->bed.density) * scene->fluid.density);
     silt_bed_heirs_give(&heirs, bed);
+}
+
+void silt_bed_release(silt_bed *bed, const silt_scene *scene, const silt_patch *patch) {
+    if (patch->n_cell == 0)
+        return;
+    silt_bed_take_out(bed, scene, patch);
+    silt_bed_refresh(bed);
 }
 
 // ---------------------------------------------------------------- loose pieces

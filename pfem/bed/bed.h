@@ -54,6 +54,10 @@ void silt_bed_patch(const silt_bed *bed, int node, silt_patch *patch);
  * newly exposed ones start with the excess over W_c, shared over their lengths of surface, at most one layer. The pore water
  * of the patch is added to bed->pore_water. The patch must be that of the bed as it is: any change renumbers cells. */
 void silt_bed_release(silt_bed *bed, const silt_scene *scene, const silt_patch *patch);
+/** The same where many leave: the list of edges, bed->solid_mass and the revision are right again after silt_bed_refresh, one for all. */
+void silt_bed_take_out(silt_bed *bed, const silt_scene *scene, const silt_patch *patch);
+/** After cells or edges changed: the list of edges, exposed, solid_mass; raises the revision. */
+void silt_bed_refresh(silt_bed *bed);
 /** Nodes whose patches hold small pieces that hang in the water: under ten patches, no edge on a wall, joined to the rest of
  * the bed by nodes at most. Releasing them all (each patch asked for anew) may need another call when the piece has cells
  * inside. @return how many (at most capacity) */
@@ -88,6 +92,8 @@ bool silt_bed_contains(const silt_bed *bed, const double *x);
 bool silt_bed_near(const silt_bed *bed, const double *x, double reach);
 /** height of the bed's surface at x, in space at (x, y), or -HUGE_VAL where there is none */
 double silt_bed_level(const silt_bed *bed, const double *at);
+/** in the plane: the lowest height of the bed's surface from x = from to to, HUGE_VAL where there is none */
+double silt_bed_lowest(const silt_bed *bed, double from, double to);
 silt_status silt_bed_save(const silt_bed *bed, silt_store *store, silt_error *err);
 /** @param walls  as for silt_bed_create */
 silt_status silt_bed_load(silt_bed *bed, const silt_walls *walls, silt_store *store, silt_error *err);

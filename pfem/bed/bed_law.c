@@ -113,7 +113,7 @@ double silt_bed_rate(const silt_scene *scene, double tau, double threshold, doub
         return 0;
     switch (def->law) {
     case BED_POWER:
-        return excess * sqrt(tau / scene->fluid.density) / def->work;
+        return excess * sqrt(tau / scene->fluid.density) / silt_bed_least_work(def->work);
     case BED_EXCESS_SHEAR:
         return def->erodibility * excess;
     case BED_SHIELDS: {
@@ -345,7 +345,7 @@ void silt_bed_wear(silt_bed *bed, const silt_scene *scene, const silt_nodes *nod
             if (isfinite(def->work))
                 bed->eroded[k] += solid * (def->layer > 0 ? plan * def->layer : patch.height) * work / silt_bed_work(bed, scene, k);
         } else {
-            const double weaker = def->law == BED_POWER ? def->work / silt_bed_work(bed, scene, k) : 1;
+            const double weaker = def->law == BED_POWER ? silt_bed_least_work(def->work) / silt_bed_work(bed, scene, k) : 1;
             bed->eroded[k] += weaker * plan * open * solid * silt_bed_rate(scene, stress.tau, threshold, level) * dt;
         }
     }
@@ -362,9 +362,21 @@ static double wear_share(const silt_bed *bed, const silt_scene *scene, int node)
     return bed->eroded[node] / patch_full(bed, &patch);
 }
 
+typedef struct wear_full {
+    int node;
+    double share;
+} wear_full;
+
+// the fullest first, of equals the lower number
+static int full_compare(const void *a, const void *b) {
+    const wear_full *p = a, *q = b;
+    return p->share != q->share ? (p->share < q->share) - (p->share > q->share) : (p->node > q->node) - (p->node < q->node);
+}
+
 int silt_bed_due(const silt_bed *bed, const silt_scene *scene, int capacity, int *due) {
-    int n = 0;
-    if (!silt_bed_erodes(&scene->bed) || capacity <= 0)
+    wear_full *full = NULL;
+    int n = 0, room = 0;
+    if (!silt_bed_erodes(&scene->bed))
         return 0;
     for (int k = 0; k < bed->n_node; k++) {
         if (!bed->exposed[k] || (bed->work[k] <= 0 && bed->eroded[k] <= 0))
@@ -373,17 +385,15 @@ int silt_bed_due(const silt_bed *bed, const silt_scene *scene, int capacity, int
         const double share = wear_share(bed, scene, k);
         if (!(share >= 1 - 1e-12))
             continue;
-        // the fullest stand in front, and push the least full one out when there are too many
-        int at = n;
-        while (at > 0 && wear_share(bed, scene, due[at - 1]) < share)
-            at--;
-        if (at == capacity)
-            continue;
-        const int moved = (n < capacity ? n : capacity - 1) - at;
-        memmove(due + at + 1, due + at, (size_t)moved * sizeof *due);
-        due[at] = k;
-        n += n < capacity;
+        SILT_RESERVE(full, room, n + 1);
+        full[n++] = (wear_full){k, share};
     }
+    if (n > 1)
+        qsort(full, (size_t)n, sizeof *full, full_compare);
+    n = n < capacity ? n : capacity;
+    for (int k = 0; k < n; k++)
+        due[k] = full[k].node;
+    free(full);
     return n;
 }
 

@@ -28,9 +28,11 @@ double silt_bed_rate(const silt_scene *scene, double tau, double threshold, doub
 
 // ---------------------------------------------------------------- on the bed
 
+/** J/m3: a bed without any W_c needs next to none, so that shares of it are numbers */
+static inline double silt_bed_least_work(double work) { return silt_max(work, 1e-100); }
 /** J/m3, W_c of a node: that of the bed, or of what was deposited */
 static inline double silt_bed_work(const silt_bed *bed, const silt_scene *scene, int node) {
-    return node >= bed->n_first && scene->bed.deposit_work > 0 ? scene->bed.deposit_work : scene->bed.work;
+    return silt_bed_least_work(node >= bed->n_first && scene->bed.deposit_work > 0 ? scene->bed.deposit_work : scene->bed.work);
 }
 /** Adds a step's frictional work and the mass per area worn off at the exposed nodes (law, shear and threshold of the scene), and
  * refreshes bed->shear and bed->y_plus.

@@ -100,15 +100,14 @@ static void index_unlink(silt_bed *bed, int cell) {
 static void index_reserve_nodes(silt_bed *bed, int need) {
     silt_bed_index *index = bed->index;
     int capacity = index->node_capacity;
-    for (int pass = 0; pass < 3; pass++) {
-        capacity = index->node_capacity;
-        if (pass == 0)
-            SILT_RESERVE(index->first, capacity, need);
-        else if (pass == 1)
-            SILT_RESERVE(index->outward, capacity, need);
-        else
-            SILT_RESERVE(index->length, capacity, need);
-    }
+    // all arrays have one capacity; each call starts from the old one
+#define RESERVE(array) (capacity = index->node_capacity, SILT_RESERVE(index->array, capacity, need))
+    RESERVE(first);
+    RESERVE(outward);
+    RESERVE(length);
+    RESERVE(surface);
+    RESERVE(surface_end);
+#undef RESERVE
     index->node_capacity = capacity;
 }
 
@@ -130,10 +129,60 @@ static void index_free(silt_bed_index *index) {
     free(index->next);
     free(index->outward);
     free(index->length);
+    free(index->surface);
+    free(index->surface_end);
+    free(index->surface_next);
     free(index->head);
     free(index->after);
     free(index->before);
     free(index);
+}
+
+static void surface_link(silt_bed *bed, int edge) {
+    silt_bed_index *index = bed->index;
+    int places = 3 * index->surface_capacity;
+    if (edge >= index->surface_capacity) {
+        SILT_RESERVE(index->surface_next, places, 3 * bed->edge_capacity);
+        index->surface_capacity = bed->edge_capacity;
+    }
+    for (int a = 0; a < bed_dim(bed); a++) {
+        const int node = bed->edge[edge][a], place = 3 * edge + a;
+        index->surface_next[place] = -1;
+        *(index->surface[node] < 0 ? &index->surface[node] : &index->surface_next[index->surface_end[node]]) = place;
+        index->surface_end[node] = place;
+    }
+}
+
+static void surface_unlink(silt_bed *bed, int edge) {
+    silt_bed_index *index = bed->index;
+    for (int a = 0; a < bed_dim(bed); a++) {
+        const int node = bed->edge[edge][a], place = 3 * edge + a;
+        int before = -1, at = index->surface[node];
+        for (; at != place; at = index->surface_next[at])
+            before = at;
+        *(before < 0 ? &index->surface[node] : &index->surface_next[before]) = index->surface_next[place];
+        if (index->surface_end[node] == place)
+            index->surface_end[node] = before;
+    }
+}
+
+// closes the list of edges up, in its order, and links its nodes anew
+static void surface_build(silt_bed *bed) {
+    silt_bed_index *index = bed->index;
+    int kept = 0;
+    for (int e = 0; e < bed->n_edge; e++) {
+        if (bed->edge[e][0] < 0)
+            continue;
+        if (kept < e)
+            memcpy(bed->edge[kept], bed->edge[e], sizeof *bed->edge);
+        kept++;
+    }
+    bed->n_edge = kept;
+    index->n_dead = 0;
+    for (int i = 0; i < bed->n_node; i++)
+        index->surface[i] = index->surface_end[i] = -1;
+    for (int e = 0; e < bed->n_edge; e++)
+        surface_link(bed, e);
 }
 
 static void index_span(silt_bed_index *index, const double *x, bool first) {
@@ -172,6 +221,7 @@ void silt_bed_index_build(silt_bed *bed) {
         index->first[i] = -1;
     for (int c = 0; c < bed->n_cell; c++)
         index_link(bed, c);
+    surface_build(bed);
 }
 
 // ---------------------------------------------------------------- nodes, cells, edges
@@ -215,7 +265,7 @@ int silt_bed_node_add(silt_bed *bed, const double *x) {
     bed->fluid_node[node] = bed->corner[node] = -1;
     bed->wall[node][0] = bed->wall[node][1] = bed->wall[node][2] = -1;
     silt_bed_index *index = bed->index;
-    index->first[node] = -1;
+    index->first[node] = index->surface[node] = index->surface_end[node] = -1;
     index->length[node] = index->outward[node][0] = index->outward[node][1] = index->outward[node][2] = 0;
     index_span(index, bed->x[node], node == 0);
     return node;
@@ -285,17 +335,21 @@ void silt_bed_edge_add(silt_bed *bed, const silt_scene *scene, const int facet[3
     if (silt_bed_on_wall(bed, scene, facet))
         return;
     SILT_RESERVE(bed->edge, bed->edge_capacity, bed->n_edge + 1);
-    memcpy(bed->edge[bed->n_edge++], facet, sizeof *bed->edge);
+    memcpy(bed->edge[bed->n_edge], facet, sizeof *bed->edge);
+    surface_link(bed, bed->n_edge++);
 }
 
 void silt_bed_edge_remove(silt_bed *bed, const int facet[3]) {
-    // the order of the others stays, so that sums over a node's edges keep their bits
-    for (int e = 0; e < bed->n_edge; e++)
-        if (facet_same(bed_dim(bed), bed->edge[e], facet)) {
-            bed->n_edge--;
-            memmove(bed->edge[e], bed->edge[e + 1], (size_t)(bed->n_edge - e) * sizeof *bed->edge);
-            return;
-        }
+    silt_bed_index *index = bed->index;
+    for (int place = index->surface[facet[0]]; place >= 0; place = index->surface_next[place]) {
+        const int e = place / 3;
+        if (!facet_same(bed_dim(bed), bed->edge[e], facet))
+            continue;
+        surface_unlink(bed, e);
+        bed->edge[e][0] = bed->edge[e][1] = bed->edge[e][2] = -1;
+        index->n_dead++;
+        return;
+    }
 }
 
 void silt_bed_facet_normal(const silt_bed *bed, const int facet[3], double *normal) {
@@ -312,24 +366,29 @@ void silt_bed_facet_normal(const silt_bed *bed, const int facet[3], double *norm
     }
 }
 
-void silt_bed_refresh(silt_bed *bed) {
+void silt_bed_refresh_nodes(silt_bed *bed, int n, const int *node) {
     silt_bed_index *index = bed->index;
     const int dim = bed_dim(bed);
-    for (int i = 0; i < bed->n_node; i++)
+    for (int k = 0; k < n; k++) {
+        const int i = node[k];
         index->length[i] = index->outward[i][0] = index->outward[i][1] = index->outward[i][2] = 0;
-    for (int e = 0; e < bed->n_edge; e++) {
-        double normal[3] = {0};
-        silt_bed_facet_normal(bed, bed->edge[e], normal);
-        const double length = hypot(hypot(normal[0], normal[1]), normal[2]);
-        for (int end = 0; end < dim; end++) {
-            const int node = bed->edge[e][end];
+        // in the order of the list: sums keep their bits
+        for (int place = index->surface[i]; place >= 0; place = index->surface_next[place]) {
+            double normal[3] = {0};
+            silt_bed_facet_normal(bed, bed->edge[place / 3], normal);
             for (int d = 0; d < dim; d++)
-                index->outward[node][d] += normal[d] / dim;
-            index->length[node] += length / dim;
+                index->outward[i][d] += normal[d] / dim;
+            index->length[i] += hypot(hypot(normal[0], normal[1]), normal[2]) / dim;
         }
-    }
-    for (int i = 0; i < bed->n_node; i++)
         bed->exposed[i] = index->length[i] > 0;
+    }
+}
+
+void silt_bed_refresh(silt_bed *bed) {
+    if (bed->index->n_dead)
+        surface_build(bed);
+    for (int i = 0; i < bed->n_node; i++)
+        silt_bed_refresh_nodes(bed, 1, &i);
 
     // Neumaier's sum: the sediment's ledger closes to the last bits
     double sum = 0, lost = 0;
@@ -371,13 +430,10 @@ void silt_bed_normal(const silt_bed *bed, int node, double *normal) {
         // the edges cancel (a spike, or a node between two patches): the normal of one of them
         n[0] = n[1] = n[2] = 0;
         n[dim - 1] = length = 1;
-        for (int e = 0; e < bed->n_edge; e++) {
-            const int *edge = bed->edge[e];
-            if (edge[0] != node && edge[1] != node && edge[2] != node)
-                continue;
-            silt_bed_facet_normal(bed, edge, n);
+        const int place = bed->index->surface[node];
+        if (place >= 0) {
+            silt_bed_facet_normal(bed, bed->edge[place / 3], n);
             length = hypot(hypot(n[0], n[1]), n[2]);
-            break;
         }
     }
     for (int d = 0; d < dim; d++)
@@ -508,4 +564,16 @@ double silt_bed_level(const silt_bed *bed, const double *at) {
         level = silt_max(level, bed_dim(bed) == 3 ? face_level(p, q, bed->x[edge[2]], at) : edge_level(p, q, at[0]));
     }
     return level;
+}
+
+double silt_bed_lowest(const silt_bed *bed, double from, double to) {
+    const double end[2] = {from, to};
+    double lowest = HUGE_VAL;
+    // the surface is lowest at one of its nodes or at an end
+    for (int k = -2; k < 2 * bed->n_edge; k++) {
+        const double *at = k < 0 ? &end[k + 2] : bed->x[bed->edge[k / 2][k % 2]], level = silt_bed_level(bed, at);
+        if (at[0] >= from && at[0] <= to && level > -HUGE_VAL)
+            lowest = silt_min(lowest, level);
+    }
+    return lowest;
 }

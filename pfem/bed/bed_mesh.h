@@ -13,6 +13,9 @@ typedef struct silt_bed_index {
     int *next;            // owned, four per cell: the node's next place, or -1
     double (*outward)[3]; // owned, one per node: its share of its exposed edges' normals times their lengths (half), m; faces: a third, m2
     double *length;       // owned, one per node: its share of its exposed edges' lengths, m, in space of faces, m2
+    int *surface, *surface_end; // owned, one per node: the first and the last of its places 3 edge + corner in the surface, or -1
+    int *surface_next;    // owned, three per edge: the node's next place, rising, or -1
+    int surface_capacity, n_dead; // edges that were taken out and still have their place
     double box_lo[3], box_hi[3]; // m, of all nodes that there ever were
     double lo[3], bin;    // a grid of bins as wide as the largest distance of a corner from its cell's centroid
     int n[3], bin_capacity;
@@ -32,9 +35,10 @@ void silt_bed_cell_remove(silt_bed *bed, int cell);
 int silt_bed_cell_at(const silt_bed *bed, const int facet[3]);
 /** Adds a facet to the surface unless it lies on a wall. */
 void silt_bed_edge_add(silt_bed *bed, const silt_scene *scene, const int facet[3]);
+/** Its place in the list stays, with -1 for its nodes, until the next refresh. */
 void silt_bed_edge_remove(silt_bed *bed, const int facet[3]);
-/** After cells or edges changed: exposed, index->outward and length, solid_mass; raises the revision. */
-void silt_bed_refresh(silt_bed *bed);
+/** After cells or edges changed around these nodes: exposed, index->outward and length of each. */
+void silt_bed_refresh_nodes(silt_bed *bed, int n, const int *node);
 /** Makes the index for the nodes and cells that there are (creation, loading). */
 void silt_bed_index_build(silt_bed *bed);
 /** true when the facet lies on a wall */
@@ -73,7 +77,7 @@ static inline double bed_volume6(const double *p, const double *q, const double 
         b[d] = r[d] - p[d];
         c[d] = s[d] - p[d];
     }
-    return (a[1] * b[2] - a[2] * b[1]) * c[0] + (a[2] * b[0] - a[0] * b[2]) * c[1] + (a[0] * b[1] - a[1] * b[0]) * c[2];
+    return silt_triple(c, a, b);
 }
 static inline double bed_distance(const double p[2], const double q[2]) {
     return hypot(q[0] - p[0], q[1] - p[1]);

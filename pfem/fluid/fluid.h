@@ -1,6 +1,6 @@
 /** @file fluid.h
  * One step of the water: momentum, pressure, correction on the midpoint mesh (docs/method.md, "Fluid"), in 2-D and 3-D.
- * Rooms: fluid.c the step, converge.c how far it is, impedance.c what it answers to rigid bodies, hold.c what surroundings hold, geometry.c shapes of the cells, assemble.c integrals over them,
+ * Rooms: fluid.c the step, start.c the velocity it starts from, converge.c how far it is, impedance.c what it answers to rigid bodies, hold.c what surroundings hold, geometry.c shapes of the cells, assemble.c integrals over them,
  * tension.c the surface's pull, momentum.c the viscous system, pressure.c the pressure system, space.c and coarse.c that of 3-D,
  * stiff.c both at once where viscosity is stiff, debt.c volume that is owed and water that cannot keep its volume.
  */
@@ -38,7 +38,7 @@ typedef struct silt_step {
 /** working space and results of a step; arrays grow only */
 typedef struct silt_fluid {
     int dim, n_node, n_cell, node_capacity, cell_capacity, share_capacity, belt_capacity, wall_capacity, shift_capacity,
-        potential_capacity, stand_capacity, v_first_capacity, debt_first_capacity, bed_force_capacity, still_capacity, ride_capacity, level_capacity, level_brake_capacity;
+        potential_capacity, stand_capacity, v_first_capacity, debt_first_capacity, bed_force_capacity, still_capacity, ride_capacity, blow_capacity, level_capacity, level_brake_capacity;
     double *x_mid;        // owned, dim per node, positions of the midpoint mesh
     double *flux;         // owned, (dim + 1) dim per cell: V grad N_a, in 3-D its mean over the step (exact change of volume)
     double *cell_volume;  // owned, per cell, at the midpoint
@@ -55,6 +55,7 @@ typedef struct silt_fluid {
     double *ride;         // owned, dim per node, m/s, of these places; NULL without slip on bodies
     double *bed_force;    // owned, dim per node, N: what a bent bed or body would push water at rest along with, taken back; NULL without
                           // slip on them
+    double *blow;         // owned, dim per node, N s, of bodies on the water while its first velocity is made free of divergence; NULL without bodies
     double *stand;        // owned, per node, kg/s, added to both sides where explicit viscosity would not be stable; NULL without
     double *potential;    // owned, per node, Pa, density times the potential of a central body force at x_mid; NULL without one
     double *belt;         // owned, dim per node, velocity of a wall's surface along itself; NULL without such walls
@@ -272,6 +273,17 @@ double silt_mode_work(const silt_fluid *fluid, const silt_mode *a, const silt_mo
 void silt_mode_clear(silt_mode *mode);
 
 // fluid.c
+/** increment = -matrix^-1 residual, in 3-D to `tolerance`, or to what is worth having where the step is solved far; seeps: it is a
+ * pressure, which the bed answers, not an impulse or the way that debts are paid */
+silt_status silt_fluid_increment(silt_fluid *fluid, const silt_step *step, bool seeps, double tolerance, silt_error *err);
+
+/** whether the node starts with its body's velocity, and not with that of the step */
+static inline bool silt_fluid_own_start(const silt_step *step, int i) { return step->body_velocity && step->nodes->kind[i] == NODE_BODY; }
+
+/** start.c: makes the velocity at the start free of divergence, into nodes->v and fluid->w; where a body has just met the water the step
+ * becomes backward Euler's from the start as it is. p: Pa, per node, at the start */
+silt_status silt_fluid_start(silt_fluid *fluid, const silt_step *step, const double *p, silt_error *err);
+
 /** v += P G q/inertia */
 void silt_fluid_correct(silt_fluid *fluid, const silt_step *step, const double *q, double *v);
 

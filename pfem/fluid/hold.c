@@ -202,7 +202,7 @@ static void hold_bed_rest(silt_fluid *f, const silt_step *s) {
 // ---------------------------------------------------------------- slip on bodies
 
 bool silt_hold_slips(const silt_step *s, int i) {
-    return s->nodes->kind[i] == NODE_BODY && s->scene->body[s->nodes->owner[i]].condition == WALL_SLIP;
+    return s->nodes->kind[i] == NODE_BODY && silt_body_slips(&s->scene->body[s->nodes->owner[i]]);
 }
 
 void silt_hold_replace(const silt_fluid *f, int i, const double *own, double *v) {
@@ -344,7 +344,7 @@ static void hold_bodies(silt_fluid *f, const silt_step *s) {
     const int n = f->n_node, D = f->dim;
     bool any = false;
     for (int b = 0; b < s->scene->n_body; b++)
-        any |= s->scene->body[b].condition == WALL_SLIP;
+        any |= silt_body_slips(&s->scene->body[b]);
     if (!any)
         return;
     const bool bed = s->scene->bed.on && s->scene->bed.condition != WALL_NO_SLIP;

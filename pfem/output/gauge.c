@@ -585,6 +585,10 @@ void silt_gauges_read(silt_gauges *gauges, const silt_view *view, double *value)
             double level = view->bed ? silt_bed_level(view->bed, def->from) : -HUGE_VAL;
             if (level > -HUGE_VAL)
                 value[0] = def->kind == GAUGE_SCOUR ? gauges->start[i] - level : level;
+        } else if (def->kind == GAUGE_BED_LOWEST) {
+            const double level = view->bed ? silt_bed_lowest(view->bed, def->from[0], def->from[1]) : HUGE_VAL;
+            if (level < HUGE_VAL)
+                value[0] = level;
         } else if (def->kind >= GAUGE_GRAIN_PLACE && def->kind <= GAUGE_GRAIN_FORCE) {
             silt_grain_gauge(view, def, value);
         } else if (def->kind >= GAUGE_GRAIN_FRONT && def->kind <= GAUGE_GRAIN_SLOPE) {

@@ -56,10 +56,7 @@ void silt_run_body_velocity(const struct silt_body *body, const double *x, int d
 }
 
 int silt_run_bodies_free(const silt_run *run) {
-    int n = 0;
-    for (int b = 0; b < run->scene->n_body && run->coupling; b++)
-        n += run->scene->body[b].motion != MOTION_FIXED;
-    return n;
+    return run->coupling ? silt_scene_moves(run->scene) : 0;
 }
 
 // the body as it is when it goes on for dt as it does

@@ -63,6 +63,8 @@ struct silt_run {
     silt_rest *rest;       // owned, rising id
     int n_owed, owed_capacity;
     double *owed;          // owned, kg, one per inlet: what has come due and is less than a parcel; none where nothing is fed
+    int pick_capacity;
+    int *pick;             // owned, bed nodes that leave together
     int n_freed, freed_capacity;
     int (*freed)[4];       // owned, bed nodes of cells released in this step
     int freed_area_capacity;
@@ -83,6 +85,8 @@ struct silt_run {
     int64_t saved_step; // of the newest checkpoint, -1: none yet
     double saved_time;
     bool whole;         // the state is that of the end of a step, nothing of the next one has been done to it
+    int64_t back, back_set_up; // step whose end a run that fails goes back to, -1: none is worth it; the last one with set_up_due
+    bool again;         // goes over steps that are in the folder already: writes neither rows nor frames, warns of nothing
     int lock;           // descriptor that keeps other runs out of the folder, -1: none
 
     silt_ledger ledger;
@@ -141,7 +145,7 @@ void silt_run_free(silt_run *run);
 
 // grains.c --------------------------------------------------------------------------------------------
 /** true where the discrete elements are set up anew: checkpoints are taken at such places only */
-bool silt_run_set_up_due(const silt_run *run);
+bool silt_run_set_up_due(const silt_run *run, double last);
 /** Grains and bodies over n of their steps, under the water's forces. again: the step was cut. */
 silt_status silt_run_grains(silt_run *run, int n, bool again, silt_error *err);
 /** what the discrete elements say of their failure, with the step and the bodies. @return status */

@@ -1,5 +1,6 @@
 // what goes from the bed to the grains and back: release, parcels that wait for room, deposition
 #include "bed_law.h"
+#include "crowd.h"
 #include "run.h"
 
 #define DEPOSIT_SPEED 0.05  // of sqrt((s - 1) g d)
@@ -9,7 +10,6 @@
 #define DEPOSIT_PATIENCE 5  // times that: what finds no sound place goes into pores
 #define DEPOSIT_PORES 0.5   // of the bed's porosity: what pores are filled to at most
 #define DEPOSIT_SHIELDS 0.8 // of the stress that moves grains
-#define RELEASE_MOST 64     // patches in one step
 #define ROOM_SIDES 19       // places beside each on the way out
 #define RELEASE_LONG 4      // radii: a parcel that had to look farther goes up through the heap on it
 #define RELEASE_FAR 12      // radii, the farthest that it looks
@@ -73,7 +73,7 @@ static void release_node(silt_run *run, int node) {
         return;
     for (int k = 0; k < patch.n_cell; k++)
         remember_cell(run, run->bed.cell[patch.cell[k]], cell_water(run, patch.cell[k]), true);
-    silt_bed_release(&run->bed, scene, &patch);
+    silt_bed_take_out(&run->bed, scene, &patch);
     silt_sum(&run->ledger.released_mass, &run->ledger.released_rest, patch.mass);
 
     double share[PARCELS_MOST];
@@ -87,14 +87,26 @@ static void release_node(silt_run *run, int node) {
     }
 }
 
+// Those of run->pick that still stand: a neighbour's release may have taken a node along, or buried it.
+static void release_picked(silt_run *run, int n) {
+    int left = 0;
+    for (int k = 0; k < n; k++)
+        if (run->bed.alive[run->pick[k]] && run->bed.exposed[run->pick[k]]) {
+            release_node(run, run->pick[k]);
+            left++;
+        }
+    if (left)
+        silt_bed_refresh(&run->bed);
+}
+
 // Sand has no strength to hang over what was washed out below it: nodes in a roof fall, a row in a step. Those between an
 // edge that faces down and one that does not are a rough wall, and stay.
-static void release_hanging(silt_run *run) {
+static int pick_hanging(silt_run *run) {
     const silt_bed *bed = &run->bed;
     const double *g = run->scene->gravity, size = gravity_of(run->scene);
-    if (!(size > 0) || bed->n_node == 0)
-        return;
-    int *count = silt_alloc((size_t)bed->n_node, sizeof *count), hanging[RELEASE_MOST], n = 0;
+    if (!(size > 0))
+        return 0;
+    int *count = silt_alloc((size_t)bed->n_node + 1, sizeof *count), n = 0;
     const int dim = bed->dim == 3 ? 3 : 2;
     for (int e = 0; e < bed->n_edge; e++) {
         double out[3] = {0};
@@ -103,85 +115,67 @@ static void release_hanging(silt_run *run) {
         for (int c = 0; c < dim; c++)
             count[bed->edge[e][c]] += up < RELEASE_HANGS ? 1 : -1000;
     }
-    for (int k = 0; k < bed->n_node && n < RELEASE_MOST; k++)
+    for (int k = 0; k < bed->n_node; k++)
         if (count[k] >= dim)
-            hanging[n++] = k;
+            run->pick[n++] = k;
     free(count);
-    for (int k = 0; k < n; k++)
-        if (bed->alive[hanging[k]] && bed->exposed[hanging[k]])
-            release_node(run, hanging[k]);
-}
-
-// slopes steeper than the angle of repose
-static void release_steep(silt_run *run) {
-    int steep[RELEASE_MOST];
-    const int n = silt_bed_steep(&run->bed, run->scene, RELEASE_MOST, steep);
-    for (int k = 0; k < n; k++)
-        if (run->bed.alive[steep[k]] && run->bed.exposed[steep[k]])
-            release_node(run, steep[k]);
+    return n;
 }
 
 // Seepage that outweighs the grains lifts them off: nodes on a surface that looks up, where its force is their weight under water
-static void release_lifted(silt_run *run) {
+static int pick_lifted(silt_run *run) {
     const silt_bed *bed = &run->bed;
     const double *g = run->scene->gravity, size = gravity_of(run->scene);
     if (!bed->seepage || !run->scene->bed.fluidise || !(size > 0))
-        return;
-    int lifted[RELEASE_MOST], n = 0;
-    for (int k = 0; k < run->seep.n_node && n < RELEASE_MOST; k++) {
+        return 0;
+    int n = 0;
+    for (int k = 0; k < run->seep.n_node; k++) {
         double normal[3] = {0};
         if (!bed->alive[k] || !bed->exposed[k] || bed->seepage[k] < 1)
             continue;
         silt_bed_normal(bed, k, normal);
         if (-silt_dot(3, normal, g) > RELEASE_LIFTS * size)
-            lifted[n++] = k;
+            run->pick[n++] = k;
     }
-    for (int k = 0; k < n; k++)
-        if (bed->alive[lifted[k]] && bed->exposed[lifted[k]])
-            release_node(run, lifted[k]);
+    return n;
 }
 
+// All that is due leaves: one layer, since what a release exposes is due in the next step.
 void silt_run_release(silt_run *run) {
-    if (!run->scene->bed.on)
+    silt_bed *bed = &run->bed;
+    const silt_scene *scene = run->scene;
+    if (!scene->bed.on)
         return;
-    int due[RELEASE_MOST];
-    const int n = silt_bed_due(&run->bed, run->scene, RELEASE_MOST, due);
-    for (int k = 0; k < n; k++) {
-        // a neighbour's release may have taken it along, or reset it
-        if (!run->bed.alive[due[k]] || !run->bed.exposed[due[k]])
-            continue;
-        release_node(run, due[k]);
+    SILT_RESERVE(run->pick, run->pick_capacity, bed->n_node + 1);
+    release_picked(run, silt_bed_due(bed, scene, bed->n_node, run->pick));
+    release_picked(run, pick_lifted(run));
+    if (bed->revision != run->bed_revision) {
+        // a patch of a loose piece goes, whether it has surface or not
+        const int n = silt_bed_loose(bed, scene, bed->n_node, run->pick);
+        for (int k = 0; k < n; k++)
+            if (bed->alive[run->pick[k]])
+                release_node(run, run->pick[k]);
+        if (n)
+            silt_bed_refresh(bed);
     }
-    release_lifted(run);
-    if (run->bed.revision != run->bed_revision) {
-        const int loose = silt_bed_loose(&run->bed, run->scene, RELEASE_MOST, due);
-        for (int k = 0; k < loose; k++)
-            if (run->bed.alive[due[k]])
-                release_node(run, due[k]);
+    if (silt_bed_erodes(&scene->bed)) {
+        release_picked(run, pick_hanging(run));
+        release_picked(run, silt_bed_steep(bed, scene, bed->n_node, run->pick));
     }
-    if (silt_bed_erodes(&run->scene->bed)) {
-        release_hanging(run);
-        release_steep(run);
-    }
-    if (run->coupling && run->bed.revision != run->bed_revision) {
-        silt_coupling_dem.bed_changed(run->coupling, &run->bed);
-        run->bed_revision = run->bed.revision;
+    if (run->coupling && bed->revision != run->bed_revision) {
+        silt_coupling_dem.bed_changed(run->coupling, bed);
+        run->bed_revision = bed->revision;
     }
 }
 
 // true when a parcel fits there
-static bool room_at(const silt_run *run, const double *x, double radius, int n_placed, const silt_release *placed) {
+static bool room_at(const silt_run *run, const double *x, double radius, const silt_crowd *placed) {
     int element;
     if (run->walls.count && silt_walls_distance(&run->walls, x, &element) < radius)
         return false;
     if (run->bed.dim == 3 && silt_bed_contains(&run->bed, x))
         return false;
-    for (int k = 0; k < n_placed; k++) {
-        const double flat = hypot(x[0] - placed[k].x[0], x[1] - placed[k].x[1]), up = x[2] - placed[k].x[2];
-        if (hypot(flat, up) <= radius + placed[k].radius)
-            return false;
-    }
-    return silt_coupling_dem.room(run->coupling, x, radius);
+    return silt_crowd_gap(placed, x, 2 * radius) > radius && silt_coupling_dem.room(run->coupling, x, radius);
 }
 
 // steps to the side, the first is none: along the surface in the plane, in rings in space. @return how many
@@ -216,8 +210,7 @@ static int room_sides(int dim, const double *n, double radius, double side[ROOM_
 }
 
 // a place for the parcel: out along the normal and to the sides; one that has waited long also straight up
-static bool find_room(const silt_run *run, const silt_waiting *waiting, double radius, int n_placed,
-                      const silt_release *placed, double out[3]) {
+static bool find_room(const silt_run *run, const silt_waiting *waiting, double radius, const silt_crowd *placed, double out[3]) {
     const double *g = run->scene->gravity, size = gravity_of(run->scene);
     const double up[3] = {size > 0 ? -g[0] / size : 0, size > 0 ? -g[1] / size : 0, size > 0 ? -g[2] / size : 0};
     const int steps = (int)silt_max(12, ceil(3 * (waiting->reach + radius) / radius)), dim = run->bed.dim == 3 ? 3 : 2;
@@ -231,7 +224,7 @@ static bool find_room(const silt_run *run, const silt_waiting *waiting, double r
             const double outward = out_step * (waiting->reach + radius) / steps;
             for (int d = 0; d < 3; d++)
                 out[d] = waiting->x[d] + outward * n[d] + side[k][d];
-            if (room_at(run, out, radius, n_placed, placed))
+            if (room_at(run, out, radius, placed))
                 return true;
         }
     }
@@ -241,14 +234,18 @@ static bool find_room(const silt_run *run, const silt_waiting *waiting, double r
 void silt_run_place(silt_run *run) {
     int n_placed = 0, kept = 0, capacity = 0;
     silt_release *placed = NULL;
+    silt_crowd crowd = {0};
     for (int k = 0; k < run->n_waiting; k++) {
         const silt_waiting *waiting = &run->waiting[k];
         silt_release release = {.mass = waiting->mass};
         memcpy(release.v, waiting->v, sizeof release.v);
         release.radius = silt_coupling_dem.parcel_radius(run->coupling, waiting->mass);
-        if (find_room(run, waiting, release.radius, n_placed, placed, release.x)) {
+        if (k == 0)
+            silt_crowd_start(&crowd, 2 * release.radius);
+        if (find_room(run, waiting, release.radius, &crowd, release.x)) {
             SILT_RESERVE(placed, capacity, n_placed + 1);
             placed[n_placed++] = release;
+            silt_crowd_add(&crowd, release.x, release.radius);
         } else {
             // it looks farther in the next step
             run->waiting[kept] = *waiting;
@@ -259,6 +256,7 @@ void silt_run_place(silt_run *run) {
     run->n_waiting = kept;
     if (n_placed)
         silt_coupling_dem.release(run->coupling, n_placed, placed);
+    silt_crowd_clear(&crowd);
     free(placed);
 }
 

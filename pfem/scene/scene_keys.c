@@ -17,7 +17,6 @@ static const silt_word scheme_words[] = {{"implicit", SCHEME_IMPLICIT}, {"fracti
 static const silt_word pressure_words[] = {{"consistent", PRESSURE_CONSISTENT}, {"laplacian", PRESSURE_LAPLACIAN}, {0}};
 static const silt_word condition_words[] = {
     {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
-static const silt_word body_condition_words[] = {{"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {0}};
 static const silt_word wall_condition_words[] = {
     {"default", WALL_DEFAULT}, {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
 static const silt_word flow_words[] = {{"turbulent", FLOW_TURBULENT}, {"laminar", FLOW_LAMINAR}, {0}};
@@ -111,6 +110,16 @@ static const silt_key time_rows[] = {
      .doc = "how often a failed step is halved"},
     {0}};
 TABLE(time, "the time block", silt_scene, -1);
+
+static const silt_key bounds_rows[] = {
+    {"volume", KEY_NUMBER, .fallback = BOUNDS_VOLUME, POSITIVE, AT(silt_scene, bounds.volume),
+     .doc = "largest `volume_error` of the water, what is owed included"},
+    {"mass", KEY_NUMBER, .fallback = BOUNDS_MASS, POSITIVE, AT(silt_scene, bounds.mass),
+     .doc = "the same without what is owed: water that is really lost or gained, as a share of start and inflow"},
+    {"energy", KEY_NUMBER, .fallback = BOUNDS_ENERGY, POSITIVE, AT(silt_scene, bounds.energy),
+     .doc = "largest energy of water, grains and bodies above that of the start and the work from outside, as a share of what could move"},
+    {0}};
+TABLE(bounds, "the bounds block", silt_scene, -1);
 
 // regions stand in lists of their own, and in the items of fluid.sizes
 #define REGION_ROWS(type, at)                                                                                          \
@@ -377,9 +386,9 @@ static const silt_key bed_rows[] = {
     {"porosity", KEY_NUMBER, .flags = KEY_OPEN_HIGH, RANGE(0, 1), AT(silt_bed_def, porosity), .doc = "share of pores"},
     {"law", KEY_WORD, .flags = KEY_SELECTOR, .fallback = "frictional-work", .words = law_words, AT(silt_bed_def, law),
      .doc = "how fast the water wears the bed; see docs/bed.md"},
-    {"work", KEY_NUMBER, .unit = "J/m3", .flags = KEY_OPEN_LOW | KEY_INFINITE, RANGE(0, HUGE_VAL),
+    {"work", KEY_NUMBER, .unit = "J/m3", .flags = KEY_INFINITE, RANGE(0, HUGE_VAL),
      AT(silt_bed_def, work), .when = ONLY(BED_FRICTIONAL_WORK) | ONLY(BED_DISSIPATION) | ONLY(BED_POWER),
-     .doc = "W_c, frictional work that loosens the bed; .inf: never. A constant of law, mesh and water, not of the soil: at a rate of "
+     .doc = "W_c, frictional work that loosens the bed; 0: whatever water wears it, a layer a step; .inf: never. A constant of law, mesh and water, not of the soil: at a rate of "
             "E m/s under tau it is h_b tau^2/(viscosity E), h_b the patch height; power: (tau - threshold) u*/E"},
     {"erodibility", KEY_NUMBER, .unit = "m3/(N s)", POSITIVE, AT(silt_bed_def, erodibility), .when = ONLY(BED_EXCESS_SHEAR),
      .doc = "k_d of E = k_d (tau - threshold); Hanson and Simon: 2e-7 threshold^-0.5"},
@@ -569,8 +578,12 @@ static const silt_key body_rows[] = {
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_body_def, velocity), .doc = "at the start"},
     {"spin", KEY_POINT, .unit = "rad/s", .flags = KEY_SPACE, .fallback = "[0, 0, 0]", AT(silt_body_def, spin),
      .doc = "angular velocity at the start"},
-    {"condition", KEY_WORD, .fallback = "no-slip", .words = body_condition_words, AT(silt_body_def, condition),
-     .doc = "of the water at its surface; slip: it goes with the surface's normal only, but sticks to edges, at waterlines and in films of one cell; not for bodies that strike walls"},
+    {"condition", KEY_WORD, .fallback = "default", .words = wall_condition_words, AT(silt_body_def, condition),
+     .doc = "of the water at its surface. slip and wall-law: it goes with the surface's normal only, but sticks to edges, at waterlines and in "
+            "films of one cell. default: wall-law where fluid.flow is turbulent; where it is laminar no-slip if cells show the layer that sticks, "
+            "viscosity/density sqrt(10 h/g) > h^2 with the least size h near bodies, else slip"},
+    {"roughness", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_body_def, roughness),
+     .doc = "equivalent sand roughness of the wall law; 0: smooth"},
     {"motion", KEY_WORD, .fallback = "free", .words = motion_words, AT(silt_body_def, motion),
      .doc = "free to move, held where it is, or moved by `path` whatever acts on it"},
     {"path", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_body_def, path),
@@ -613,6 +626,8 @@ static const silt_key gauge_rows[] = {
      AT(silt_gauge_def, from), .doc = "height of the bed at this x (3-D: [x, y])"},
     {"scour_at", KEY_PLACE, .unit = "m", .flags = KEY_CHOICE, .select = GAUGE_SCOUR,
      AT(silt_gauge_def, from), .doc = "how deep the bed lies under its level at the start, at this x (3-D: [x, y])"},
+    {"bed_lowest", KEY_PAIR, .unit = "m", .flags = KEY_CHOICE | KEY_PLANE, .select = GAUGE_BED_LOWEST,
+     AT(silt_gauge_def, from), .doc = "height of the lowest place of the bed's surface between these two x"},
     {"extent", KEY_SIGN, .flags = KEY_CHOICE, .words = extent_words, .select = GAUGE_EXTENT, AT(silt_gauge_def, from),
      .doc = "length of connected water along this axis, m"},
     {"grains_front", KEY_SIGN, .flags = KEY_CHOICE, .words = front_words, .select = GAUGE_GRAIN_FRONT, AT(silt_gauge_def, from),
@@ -716,6 +731,8 @@ static const silt_key scene_rows[] = {
     {"periodic", KEY_PAIR, .unit = "m", .flags = KEY_OPTIONAL, AT(silt_scene, period),
      .doc = "the scene repeats in x: what leaves at one end enters at the other"},
     {"time", KEY_BLOCK, .sub = &time_table, .doc = "how long, how often, how fine"},
+    {"bounds", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &bounds_table, .presence = PRESENT_FLAG, .present = offsetof(silt_scene, bounds.on),
+     .doc = "how far the run's ledgers may be off before the run warns of it at its end and `silt verify` fails"},
     {"gravity", KEY_POINT, .unit = "m/s2", AT(silt_scene, gravity),
      .doc = "acceleration, for example [0, -9.81], in 3-D [0, 0, -9.81]"},
     {"fluid", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &fluid_table, .presence = PRESENT_FLAG,
