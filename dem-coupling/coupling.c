@@ -593,6 +593,7 @@ static silt_status coupling_create(silt_coupling **coupling, const silt_coupling
     silt_coupling *c = *coupling = silt_alloc(1, sizeof *c);
     c->scene = def->scene;
     c->walls = def->walls;
+    c->box_margin = def->margin;
     c->dim = def->scene->dimension == 3 ? 3 : 2;
     c->next_id = c->sent_id = 1;
     c->view = silt_alloc(1, sizeof *c->view);
@@ -695,7 +696,10 @@ static void coupling_close(silt_coupling **coupling) {
 
 static double coupling_step(const silt_coupling *c) { return c->step; }
 
-static silt_body_state *coupling_bodies(const silt_coupling *c) { return c->bodies; }
+static silt_body_state *coupling_bodies(const silt_coupling *c) {
+    silt_coupling_bodies_gone(c);
+    return c->bodies;
+}
 
 static int coupling_process(const silt_coupling *c) { return silt_dem_process(c->dem); }
 

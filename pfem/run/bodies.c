@@ -265,11 +265,11 @@ static bool moves(const silt_body_def *def, int mode) {
     return def->motion == MOTION_FREE && !(def->held >> (mode < 3 ? mode : 3) & 1);
 }
 
-// it waits for its release, which hangs on the force that acts on it as it stands; in the rest of the step in which that comes it moves
+// it has left for good, or waits for its release, which hangs on the force that acts on it as it stands; in the rest of the step in which that comes it moves
 // with its own mass
 static bool waits(const silt_run *run, int b) {
     const struct silt_body *body = &run->body_before[b];
-    return run->scene->body[b].release.on && silt_length(3, body->v) == 0 && silt_length(3, body->w) == 0;
+    return body->gone || (run->scene->body[b].release.on && silt_length(3, body->v) == 0 && silt_length(3, body->w) == 0);
 }
 
 static silt_impedance impedance_begin(const silt_run *run) {

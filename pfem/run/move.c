@@ -140,12 +140,12 @@ static void place_bodies(silt_run *run) {
     }
 }
 
-// water that crossed an outlet, or left the box of the scene
+// water that crossed an outlet, or left the box of the scene; nodes of bodies, which are out of the water beyond an outlet
 static void let_out(silt_run *run) {
     silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
     for (int i = 0; i < nodes->count; i++) {
-        if (nodes->kind[i] != NODE_FLUID || run->memory.dead[i])
+        if ((nodes->kind[i] != NODE_FLUID && nodes->kind[i] != NODE_BODY) || run->memory.dead[i])
             continue;
         const double *x = nodes->x + D * i, *old = run->x_old + D * i;
         bool gone = false;

@@ -124,6 +124,7 @@ struct silt_run {
     double *p_shown; // owned, 1 per node
     int x_old_capacity, v_old_capacity, debt_old_capacity, map_capacity, p_old_capacity, p_shown_capacity;
     double box_lo[3], box_hi[3]; // what lies outside has left
+    double box_margin;           // m, of that box around what the scene spans
     double way_lo[3], way_hi[3]; // what walls with a motion span from the start to the end
 };
 
