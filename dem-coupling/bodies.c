@@ -1,4 +1,5 @@
 // bodies.c: rigid objects of the scene: surfaces, clumps, masses and places, and what the discrete elements are told of them
+#include "pose.h"
 #include "state.h"
 
 static const double clump_spacing = 0.3; // between the spheres of an outline, times their radius
@@ -183,7 +184,7 @@ silt_status silt_coupling_send_bodies(silt_coupling *c, silt_error *err) {
                               .sphere = clump->sphere,
                               .mass = b->mass * c->width,
                               .inertia = b->inertia[2] * c->width,
-                              .angle = c->dim == 3 ? 0.0 : 2.0 * atan2(b->q[3], b->q[0]),
+                              .angle = c->dim == 3 ? 0.0 : silt_pose_angle(b->q),
                               .fixed = c->body[i].fixed};
         for (int k = 0; k < 6; k++)
             body.tensor[k] = b->inertia[k] * c->width;
@@ -208,7 +209,7 @@ double silt_coupling_body_distance(const silt_coupling *c, int i, const double *
     double d[2] = {x[0] - b->x[0], x[1] - b->x[1]}, bound = hypot(d[0], d[1]) - c->body[i].shape.radius;
     if (bound > far)
         return bound;
-    double angle = 2.0 * atan2(b->q[3], b->q[0]);
+    double angle = silt_pose_angle(b->q);
     double local[2] = {cos(angle) * d[0] + sin(angle) * d[1], cos(angle) * d[1] - sin(angle) * d[0]};
     return silt_outline_distance(&c->body[i].shape, local);
 }

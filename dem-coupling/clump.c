@@ -50,6 +50,8 @@ static int clump_balls(const silt_solid *s, const silt_solid *skin, double large
             inwards[d] = f < 0 ? -skin->corner[i][d] : -skin->normal[f][d];
         }
         const double length = silt_length(3, inwards);
+        if (!(length > 0)) // a folded skin has no inside there
+            continue;
         for (int d = 0; d < 3; d++)
             inwards[d] /= length;
         const double radius = ball_radius(s, x, inwards, largest);

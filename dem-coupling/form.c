@@ -187,7 +187,7 @@ static void form_tetrapod(form *f) {
             e[d] = (towards[d] - cosine * a[d]) / sine;
             middle[d] = tetrapod_length * a[d];
         }
-        wall_cross(a, e, g);
+        silt_cross(a, e, g);
         for (int i = 0; i < FORM_LEG; i++) {
             const double angle = 2 * M_PI * i / FORM_LEG;
             // the nearest other leg: at the angles 0, 120, 240 degrees; s goes along the axis, r outwards:

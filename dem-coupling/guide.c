@@ -1,6 +1,7 @@
 // guide.c: what the worker is told of bodies that are held, prescribed, tied or set free, and of walls whose speed changes in a run
 #include "guide.h"
 
+#include "pose.h"
 #include "state.h"
 
 // s, end of substep k of the n that end when the walls stand where they are
@@ -29,7 +30,7 @@ static double guide_turned(const silt_coupling *c, int i) {
     const struct silt_body *b = &c->bodies->body[i];
     double x[3] = {1, 0, 0};
     if (c->dim != 3)
-        return 2 * atan2(b->q[3], b->q[0]);
+        return silt_pose_angle(b->q);
     silt_turn(c->body[i].first, true, x, x);
     silt_turn(b->q, false, x, x);
     return atan2(x[2], x[0]);

@@ -2,6 +2,7 @@
 // way: adds springs, takes out what is held, and sets velocities so that a path is met.
 #define _GNU_SOURCE
 #include "motion.h"
+#include "base.h"
 #include "response.h"
 
 #include <dlfcn.h>
@@ -88,13 +89,6 @@ static int motion_look(int slot, motion_body *b) {
     return 1;
 }
 
-static double motion_dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-static void motion_cross(const double *a, const double *b, double *c) {
-    const double out[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    memcpy(c, out, sizeof out);
-}
-
 void motion_begin(dem_guide *guide, const dem_shared *shared) {
     motion.guide = guide;
     motion.step = shared->step;
@@ -120,7 +114,7 @@ void motion_begin(dem_guide *guide, const dem_shared *shared) {
         motion_body b;
         const dem_tie *tie = &dem_guide_tie(guide)[k];
         for (int c = 0; c < 3 && motion_look(tie->slot, &b); c++)
-            motion.arm[k][c] = motion_dot(tie->arm, b.axis[c]);
+            motion.arm[k][c] = silt_dot(3, tie->arm, b.axis[c]);
     }
 }
 
@@ -135,7 +129,7 @@ void motion_end(void) { motion.guide = NULL; }
 static void motion_spin(const motion_body *b, double *omega) {
     double turn[3];
     for (int c = 0; c < 3; c++)
-        turn[c] = motion_dot(b->momentum, b->axis[c]) / b->inertia[c];
+        turn[c] = silt_dot(3, b->momentum, b->axis[c]) / b->inertia[c];
     for (int d = 0; d < 3; d++)
         omega[d] = turn[0] * b->axis[0][d] + turn[1] * b->axis[1][d] + turn[2] * b->axis[2][d];
 }
@@ -144,7 +138,7 @@ static void motion_set_spin(const motion_body *b, const double *omega) {
     memset(b->momentum, 0, 3 * sizeof(double));
     for (int c = 0; c < 3; c++)
         for (int d = 0; d < 3; d++)
-            b->momentum[d] += b->inertia[c] * motion_dot(omega, b->axis[c]) * b->axis[c][d];
+            b->momentum[d] += b->inertia[c] * silt_dot(3, omega, b->axis[c]) * b->axis[c][d];
 }
 
 static void motion_pull(const dem_tie *tie, const double *local, const motion_body *b) {
@@ -153,22 +147,22 @@ static void motion_pull(const dem_tie *tie, const double *local, const motion_bo
         for (int d = 0; d < motion.dim; d++)
             arm[d] += local[c] * b->axis[c][d];
     motion_spin(b, omega);
-    motion_cross(omega, arm, speed);
+    silt_cross(omega, arm, speed);
     for (int d = 0; d < 3; d++) {
         way[d] = d < motion.dim ? b->x[d] + arm[d] - tie->to[d] : 0;
         speed[d] += b->v[d];
     }
-    const double length = sqrt(motion_dot(way, way));
+    const double length = sqrt(silt_dot(3, way, way));
     if (tie->line && length <= tie->length)
         return;
     if (!(length > 0))
         return; // no direction
-    double pull = tie->stiffness * (length - tie->length) + tie->damping * motion_dot(speed, way) / length;
+    double pull = tie->stiffness * (length - tie->length) + tie->damping * silt_dot(3, speed, way) / length;
     if (tie->line && pull < 0)
         return;
     for (int d = 0; d < 3; d++)
         force[d] = -pull * way[d] / length;
-    motion_cross(arm, force, torque);
+    silt_cross(arm, force, torque);
     for (int d = 0; d < 3; d++) {
         b->force[d] += force[d];
         b->torque[d] += torque[d];
@@ -196,12 +190,12 @@ static void motion_follow(const double row[4], const motion_pose *from, const mo
         memcpy(to, from->axis[a], sizeof to);
         to[0] = c * from->axis[a][0] - s * from->axis[a][up];
         to[up] = s * from->axis[a][0] + c * from->axis[a][up];
-        motion_cross(b->axis[a], to, part);
+        silt_cross(b->axis[a], to, part);
         for (int d = 0; d < 3; d++)
             turn[d] += part[d] / 2;
     }
     // the sine of the angle that is left
-    const double sine = sqrt(motion_dot(turn, turn)), share = sine > 1e-8 ? asin(fmin(sine, 1)) / sine : 1;
+    const double sine = sqrt(silt_dot(3, turn, turn)), share = sine > 1e-8 ? asin(fmin(sine, 1)) / sine : 1;
     for (int d = 0; d < 3; d++) {
         b->force[d] = b->torque[d] = 0;
         b->v[d] = d < motion.dim ? (row[d] - b->x[d]) / motion.step : 0;
@@ -215,7 +209,7 @@ static void motion_guide(dem_guided *to, const motion_pose *from, const motion_b
         motion_follow(dem_guide_path(motion.guide, to->path)[motion.substep], from, b);
         return;
     }
-    const double force = sqrt(motion_dot(b->force, b->force));
+    const double force = sqrt(silt_dot(3, b->force, b->force));
     to->freed |= force > to->force;
     if (to->freed || motion.substep >= to->release)
         return;

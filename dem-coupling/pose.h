@@ -8,6 +8,8 @@
 
 /** numbers of a sphere of a clump: its centre in dim numbers, its radius */
 static inline int silt_clump_width(int dim) { return dim == 3 ? 4 : 3; }
+/** how far a body of the plane is turned, -2 pi to 2 pi */
+static inline double silt_pose_angle(const double q[4]) { return 2 * atan2(q[3], q[0]); }
 /** quaternion of the rotation that carries the axes `from` to the axes `to` (three unit vectors each, in space) after q.
  * Of the two that say the same it is the one nearer to `near`. */
 void silt_pose_carried(const double from[3][3], const double to[3][3], const double q[4], const double near[4], double out[4]);

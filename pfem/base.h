@@ -85,6 +85,17 @@ static inline double silt_dot(int dim, const double *a, const double *b) {
         sum += a[d] * b[d];
     return sum;
 }
+/** a x b; out may be one of them */
+static inline void silt_cross(const double *a, const double *b, double *out) {
+    const double c[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    out[0] = c[0];
+    out[1] = c[1];
+    out[2] = c[2];
+}
+/** u . (v x w): six times the volume of a tetrahedron with these edges */
+static inline double silt_triple(const double *u, const double *v, const double *w) {
+    return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
+}
 /** Adds x to a sum that is carried on for ever; rest holds what rounding left out of it (Neumaier 1974), so that sum is right to its last bit. */
 static inline void silt_sum(double *sum, double *rest, double x) {
     const double t = *sum + x;

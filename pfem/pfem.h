@@ -430,6 +430,7 @@ typedef struct silt_ledger {
     double grain_mass, sediment_error;
     double grain_velocity[3];                     // m/s, mean by mass
     double grain_kinetic, grain_potential;        // J/m, with the spin's; against the height 0
+    double body_kinetic, body_potential;          // J/m, of bodies that move, with the spin's; against the height 0
     double grain_water[3], grain_contact[3];      // N/m, force of the water and of contacts on all grains, mean of the last step
     double external_work, dissipation;            // J/m, cumulative
     double max_speed;                             // m/s, of the water's nodes

@@ -323,7 +323,7 @@ static void test_history_columns(void **state) {
     assert_int_equal(silt_history_close(&history, &err), SILT_OK);
     assert_string_equal(content("history.csv"),
                         WATER "bed_mass,released_mass,deposited_mass,pore_water_mass,bed_shear,bed_work,bed_y_plus,grain_count,grain_mass," GRAIN_FORCES
-                              "sediment_error,left_mass,inflow_mass,outflow_mass,block_x,block_y,block_z,block_vx,"
+                              "sediment_error,left_mass,body_kinetic_energy,body_potential_energy,inflow_mass,outflow_mass,block_x,block_y,block_z,block_vx,"
                               "block_vy,block_vz,block_qw,block_qx,block_qy,block_qz,block_wx,block_wy,block_wz,"
                               "block_fx,block_fy,block_fz,block_tx,block_ty,block_tz,block_cx,block_cy,block_cz,"
                               "v_x,v_y,v_z,q," WALLS);

@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "check.h"
 #include "run.h"
 #include "scene_text.h"
 
@@ -25,13 +26,6 @@ static char folder[512];
 #define BED "bed: {density: 2650, porosity: 0.4, work: .inf, size: 0.02, condition: slip, regions: [{box: [[0, 0], [2, 0.5]]}]"
 // water above a bed and without it: what the bed takes is the difference
 #define SHALLOW "density: 1000, viscosity: 1.0e-3, size: 0.02, tolerance: 1.0e-3, regions: [{box: [[0, 0.5], [2, 1]]}]"
-
-static bool zero(const void *data, size_t size) {
-    for (size_t k = 0; k < size; k++)
-        if (((const char *)data)[k])
-            return false;
-    return true;
-}
 
 static bool has_size(const silt_run *run) {
     return run->size || run->nodes.h;
@@ -56,7 +50,7 @@ static bool has_coupling(const silt_run *run) {
 }
 static bool has_bodies(const silt_run *run) {
     return (run->barrier.bodies && run->barrier.bodies->count) || run->body_before || run->body_after || run->body_velocity || run->body_shift ||
-           run->gap_force || run->body_carry || run->uplift;
+           run->body_carry || run->uplift;
 }
 static bool has_fed(const silt_run *run) {
     return run->owed;
@@ -140,19 +134,18 @@ static int children(void) {
 // path: a scene of the tree, else a text
 static sight see(const char *name, const char *path, const char *text, unsigned expected) {
     silt_run run;
-    silt_error err = {0};
     const silt_run_def def = {.quiet = true, .threads = 1};
     silt_scene *scene = path ? NULL : scene_of(text);
-    if (path && silt_scene_read(path, 0, NULL, &scene, &err))
-        fail_msg("%s", err.text);
+    if (path)
+        OK(silt_scene_read(path, 0, NULL, &scene, &error));
     snprintf(folder, sizeof folder, "%s/tests/parts-XXXXXX", SILT_BINARY);
     assert_non_null(mkdtemp(folder));
     const double before = heap();
-    if (silt_run_open(&run, scene, &def, folder, -1, &err))
-        fail_msg("%s: %s", name, err.text);
+    if (silt_run_open(&run, scene, &def, folder, -1, &error))
+        fail_msg("%s: %s", name, error.text);
     for (int i = 0; i < 3; i++)
-        if (silt_run_advance(&run, &err))
-            fail_msg("%s: %s", name, err.text);
+        if (silt_run_advance(&run, &error))
+            fail_msg("%s: %s", name, error.text);
     sight s = {.n_node = run.nodes.count, .n_bed = run.bed.n_node, .bytes = heap() - before};
     s.n_grain = run.coupling ? silt_coupling_dem.grains(run.coupling)->count : 0;
     for (int k = 0; k < N_PART; k++) {

@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 
+#include "check.h"
 #include "run.h"
 
 #include <unistd.h>
@@ -18,16 +19,13 @@ static char folder[512];
 
 // a scene of the tree, with what is set in it, at its start in a folder of its own
 static void begin(silt_run *run, silt_scene **scene, const char *path, int n_set, const char *const *set) {
-    silt_error err = {0};
     silt_run_def def = {.quiet = true};
     char full[1024];
     snprintf(full, sizeof full, "%s/%s", SILT_SOURCE, path);
-    if (silt_scene_read(full, n_set, set, scene, &err) != SILT_OK)
-        fail_msg("%s", err.text);
+    OK(silt_scene_read(full, n_set, set, scene, &error));
     snprintf(folder, sizeof folder, "%s/tests/run-XXXXXX", SILT_BINARY);
     assert_non_null(mkdtemp(folder));
-    if (silt_run_open(run, *scene, &def, folder, -1, &err) != SILT_OK)
-        fail_msg("%s", err.text);
+    OK(silt_run_open(run, *scene, &def, folder, -1, &error));
 }
 
 static void end(silt_run *run, silt_scene **scene) {
@@ -46,13 +44,6 @@ static void steps(silt_run *run, int n) {
     for (int k = 0; k < n; k++)
         if (silt_run_advance(run, &err) != SILT_OK)
             fail_msg("step %d: %s", k, err.text);
-}
-
-static bool zero(const void *data, size_t size) {
-    for (size_t k = 0; k < size; k++)
-        if (((const char *)data)[k])
-            return false;
-    return true;
 }
 
 // ---------------------------------------------------------------- water alone

@@ -295,6 +295,8 @@ static void test_clump(void **state) {
         {{.name = "cube", .shape = SHAPE_BOX, .scale = 1}, 0.05},
         {{.name = "sphere", .shape = SHAPE_SPHERE, .scale = 1}, 0.01},
         {{.name = "cylinder", .shape = SHAPE_CYLINDER, .scale = 1, .height = 0.7}, 0.04},
+        // a face of its top once folded over, and a point of it had no inside
+        {{.name = "post", .shape = SHAPE_CYLINDER, .scale = 0.16, .height = 0.8}, 0.16 / 15},
         {{.name = "tetrapod", .shape = SHAPE_TETRAPOD, .scale = 1}, 0.03},
     };
     for (size_t k = 0; k < sizeof form / sizeof *form; k++) {

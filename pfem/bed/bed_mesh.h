@@ -77,7 +77,7 @@ static inline double bed_volume6(const double *p, const double *q, const double 
         b[d] = r[d] - p[d];
         c[d] = s[d] - p[d];
     }
-    return (a[1] * b[2] - a[2] * b[1]) * c[0] + (a[2] * b[0] - a[0] * b[2]) * c[1] + (a[0] * b[1] - a[1] * b[0]) * c[2];
+    return silt_triple(c, a, b);
 }
 static inline double bed_distance(const double p[2], const double q[2]) {
     return hypot(q[0] - p[0], q[1] - p[1]);

@@ -46,6 +46,8 @@ void silt_assemble_pressure(const silt_fluid *f, const silt_mesh *mesh, const do
         BY_CELL(SUMS(f->dim, out, NULL), pressure, p, f->share);
     else
         BY_CELL(SUMS(f->dim, out, NULL), pressure, p, NULL);
+    if (f->film)
+        silt_film_push(f->film, mesh, p, out);
 }
 
 KERNEL pressure_lost(const int D, const silt_fluid *f, const silt_mesh *mesh, const double *p, double *lost) {
@@ -218,6 +220,8 @@ void silt_assemble_continuity(silt_fluid *f, const silt_mesh *mesh, const silt_d
         BY_CELL(SUMS(1, f->withheld, f->residual), continuity, v, p, f->potential, f->share);
     else
         BY_CELL(SUMS(1, f->withheld, f->residual), continuity, v, p, NULL, NULL);
+    if (f->film)
+        silt_film_continuity(f->film, mesh, f->mobile, v, f->residual, f->withheld);
     SILT_PARALLEL(f->n_node)
     for (int j = 0; j < f->n_node; j++)
         if (f->mobile[j] == MOBILE_SPRAY) { // its pressure is given: the smoothing's share is owed too
@@ -292,4 +296,6 @@ void silt_assemble_divergence(const silt_fluid *f, const silt_mesh *mesh, const 
         BY_CELL(SUMS(1, NULL, out), divergence, v, p, f->share);
     else
         BY_CELL(SUMS(1, NULL, out), divergence, v, p, NULL);
+    if (f->film)
+        silt_film_mouths(f->film, mesh, NULL, v, out, NULL);
 }

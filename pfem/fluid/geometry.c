@@ -293,6 +293,8 @@ void silt_assemble_geometry(silt_fluid *f, const silt_step *step, double dt) {
         if (f->wall_normals.n_row || f->ride)
             silt_hold_bent(f, step);
     }
+    if (f->film)
+        silt_film_place(f->film, step, f->x_mid, dt);
     stabilisation(f, 2 * rho * per_time);
     if (drag)
         BY_DIM(shares, f, step->mesh, drag->solid, rho);

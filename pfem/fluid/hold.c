@@ -202,7 +202,7 @@ static void hold_bed_rest(silt_fluid *f, const silt_step *s) {
 // ---------------------------------------------------------------- slip on bodies
 
 bool silt_hold_slips(const silt_step *s, int i) {
-    return s->nodes->kind[i] == NODE_BODY && s->scene->body[s->nodes->owner[i]].condition == WALL_SLIP;
+    return s->nodes->kind[i] == NODE_BODY && silt_body_slips(&s->scene->body[s->nodes->owner[i]]);
 }
 
 void silt_hold_replace(const silt_fluid *f, int i, const double *own, double *v) {
@@ -215,19 +215,17 @@ void silt_hold_replace(const silt_fluid *f, int i, const double *own, double *v)
         v[d] = f->hold[i] == HOLD_ALL ? held[d] : v[d] + (held[d] - loose[d]);
 }
 
-// normal of a facet that moves evenly, mean over the step: the continuity of a cell in space asks for that one, in the plane it is
-// that of the midpoint
-static void facet_mean_normal(const silt_fluid *f, const silt_step *s, const double *x_mid, const int *facet, double n[3]) {
-    facet_normal(s->mesh, x_mid, facet, n);
-    if (f->dim != 3 || x_mid == s->nodes->x)
+void silt_facet_mean_normal(const silt_mesh *mesh, const double *x, const double *x_mid, const int *facet, double n[3]) {
+    facet_normal(mesh, x_mid, facet, n);
+    if (mesh->dim != 3 || x_mid == x)
         return;
     double end[9], first[3], last[3];
     const int own[3] = {0, 1, 2};
     for (int c = 0; c < 3; c++)
         for (int d = 0; d < 3; d++)
-            end[3 * c + d] = 2 * x_mid[3 * facet[c] + d] - s->nodes->x[3 * facet[c] + d];
-    facet_normal(s->mesh, s->nodes->x, facet, first);
-    facet_normal(s->mesh, end, own, last);
+            end[3 * c + d] = 2 * x_mid[3 * facet[c] + d] - x[3 * facet[c] + d];
+    facet_normal(mesh, x, facet, first);
+    facet_normal(mesh, end, own, last);
     for (int d = 0; d < 3; d++)
         n[d] = (first[d] + 4 * n[d] + last[d]) / 6;
 }
@@ -256,7 +254,7 @@ static void body_normals(silt_fluid *f, const silt_step *s, const double *x_mid)
         if (mesh->facet_kind[k] != FACET_BODY || !silt_hold_slips(s, facet[0]))
             continue;
         double n[3];
-        facet_mean_normal(f, s, x_mid, facet, n);
+        silt_facet_mean_normal(mesh, s->nodes->x, x_mid, facet, n);
         for (int c = 0; c < D; c++) {
             const int i = facet[c];
             if (!body_loose(f, s, i))
@@ -346,7 +344,7 @@ static void hold_bodies(silt_fluid *f, const silt_step *s) {
     const int n = f->n_node, D = f->dim;
     bool any = false;
     for (int b = 0; b < s->scene->n_body; b++)
-        any |= s->scene->body[b].condition == WALL_SLIP;
+        any |= silt_body_slips(&s->scene->body[b]);
     if (!any)
         return;
     const bool bed = s->scene->bed.on && s->scene->bed.condition != WALL_NO_SLIP;
@@ -367,6 +365,27 @@ static void hold_bodies(silt_fluid *f, const silt_step *s) {
     body_normals(f, s, s->nodes->x);
 }
 
+// Nodes at the mouths of films go along walls as the body does. @param fresh  what holds them was found anew for all; else on bent walls
+static void hold_slaves(silt_fluid *f, const silt_step *s, bool fresh) {
+    const int D = f->dim;
+    for (int k = 0; f->film && k < f->film->n_slave; k++) {
+        const int i = f->film->slave[k];
+        struct silt_film_way *way = &f->film->way[k];
+        if (fresh || f->hold[i] != HOLD_ALL) {
+            way->hold = f->hold[i];
+            memcpy(way->vector, f->normal + D * i, (size_t)D * sizeof(double));
+            memcpy(way->given, f->given + D * i, (size_t)D * sizeof(double));
+        }
+        double v[3] = {0};
+        if (s->body_velocity)
+            memcpy(v, s->body_velocity + D * i, (size_t)D * sizeof(double));
+        silt_film_free_part(f->film, k, D, v);
+        f->hold[i] = HOLD_ALL;
+        for (int d = 0; d < D; d++)
+            f->given[D * i + d] = way->given[d] + v[d];
+    }
+}
+
 void silt_hold_bodies_again(silt_fluid *f, const silt_step *s) {
     const int D = f->dim;
     for (int i = 0; i < f->n_node; i++) {
@@ -378,6 +397,9 @@ void silt_hold_bodies_again(silt_fluid *f, const silt_step *s) {
         else
             memset(f->w + D * i, 0, (size_t)D * sizeof(double));
     }
+    hold_slaves(f, s, false);
+    for (int k = 0; f->film && k < f->film->n_slave; k++)
+        memcpy(f->w + D * f->film->slave[k], f->given + D * f->film->slave[k], (size_t)D * sizeof(double));
     if (!f->ride)
         return;
     body_ride(f, s);
@@ -399,6 +421,7 @@ void silt_hold_bent(silt_fluid *f, const silt_step *s) {
         memcpy(f->normal + D * i, vector, (size_t)D * sizeof(double));
         memcpy(f->given + D * i, given, (size_t)D * sizeof(double));
     }
+    hold_slaves(f, s, false);
 }
 
 void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
@@ -433,4 +456,5 @@ void silt_hold_nodes(silt_fluid *f, const silt_step *s) {
         hold_bed_rest(f, s);
     }
     hold_bodies(f, s);
+    hold_slaves(f, s, true);
 }

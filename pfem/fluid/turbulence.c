@@ -28,10 +28,9 @@ double silt_facet_distance(int dim, const double *point, const double *corner) {
         v[d] = corner[6 + d] - corner[d];
         w[d] = point[d] - corner[d];
     }
-    const double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-    const double nn = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-    const double s = (n[0] * (w[1] * v[2] - w[2] * v[1]) + n[1] * (w[2] * v[0] - w[0] * v[2]) + n[2] * (w[0] * v[1] - w[1] * v[0]));
-    const double t = (n[0] * (u[1] * w[2] - u[2] * w[1]) + n[1] * (u[2] * w[0] - u[0] * w[2]) + n[2] * (u[0] * w[1] - u[1] * w[0]));
+    double n[3];
+    silt_cross(u, v, n);
+    const double nn = silt_dot(3, n, n), s = silt_triple(n, w, v), t = silt_triple(n, u, w);
     if (nn > 0 && s >= 0 && t >= 0 && s + t <= nn)
         return fabs(n[0] * w[0] + n[1] * w[1] + n[2] * w[2]) / sqrt(nn);
     return silt_min(segment_distance(3, point, corner, corner + 3),

@@ -119,7 +119,7 @@ double silt_wall_stress(double rho, double nu, double speed, double height, doub
 /** a node on a wall with the law of the wall, and the place in the water that its traction is taken from */
 typedef struct silt_wall_point {
     int node;
-    int element;         // of the walls, -1: bed
+    int element;         // of the walls, -1: bed or body
     int sample[4];       // nodes that hold the velocity there, -1
     double weight[4];    // their shares
     double normal[3];    // unit, into the water

@@ -49,6 +49,7 @@ static int condition_of(const silt_scene *scene, const silt_walls *walls, const 
             *roughness = silt_bed_roughness(scene);
         return scene->bed.condition == WALL_DEFAULT ? WALL_NO_SLIP : (int)scene->bed.condition;
     case FACET_BODY:
+        *roughness = scene->body[nodes->owner[mesh->facet[facet][0]]].roughness;
         return (int)scene->body[nodes->owner[mesh->facet[facet][0]]].condition;
     case FACET_WALL:
         *element = walls ? facet_element(walls, nodes, mesh->facet[facet], mesh->dim == 3 ? 3 : 2) : -1;
@@ -111,7 +112,7 @@ static double volume6(const double *a, const double *b, const double *c, const d
         v[k] = c[k] - a[k];
         w[k] = d[k] - a[k];
     }
-    return u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
+    return silt_triple(u, v, w);
 }
 
 // barycentric weights of a point in a cell; false when the cell is flat
@@ -243,7 +244,7 @@ static void toe_find(silt_wall_law *law, const silt_scene *scene, const silt_wal
         const bool law_wall = !open && condition_of(scene, walls, nodes, mesh, k, &roughness, &element) == WALL_LAW;
         const int *facet = mesh->facet[k];
         for (int a = 0; a < dim; a++) {
-            edge[facet[a]] |= open ? 1 : law_wall ? 2 : 0;
+            edge[facet[a]] |= open ? 1 : law_wall && nodes->kind[facet[a]] != NODE_BODY ? 2 : 0;
             // out of the wetted part of the wall
             for (int b = 0; b < dim && law_wall; b++)
                 for (int d = 0; d < dim && b != a; d++)

@@ -104,10 +104,6 @@ static bool weights_2d(const double *c, const double *point, double *w) {
     return true;
 }
 
-static double triple(const double *u, const double *v, const double *w) {
-    return u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
-}
-
 static bool weights_3d(const double *c, const double *point, double *w) {
     double edge[3][3], to[3];
     for (int d = 0; d < 3; d++) {
@@ -115,12 +111,12 @@ static bool weights_3d(const double *c, const double *point, double *w) {
         for (int a = 0; a < 3; a++)
             edge[a][d] = c[3 * (a + 1) + d] - c[d];
     }
-    const double six = triple(edge[0], edge[1], edge[2]);
+    const double six = silt_triple(edge[0], edge[1], edge[2]);
     if (!(six > 0))
         return false;
-    w[1] = triple(to, edge[1], edge[2]) / six;
-    w[2] = triple(edge[0], to, edge[2]) / six;
-    w[3] = triple(edge[0], edge[1], to) / six;
+    w[1] = silt_triple(to, edge[1], edge[2]) / six;
+    w[2] = silt_triple(edge[0], to, edge[2]) / six;
+    w[3] = silt_triple(edge[0], edge[1], to) / six;
     w[0] = 1 - w[1] - w[2] - w[3];
     return true;
 }

@@ -367,9 +367,7 @@ static double tetrahedron_volume(const double *a, const double *b, const double 
         v[k] = c[k] - a[k];
         w[k] = d[k] - a[k];
     }
-    return (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) +
-            u[2] * (v[0] * w[1] - v[1] * w[0])) /
-           6;
+    return silt_triple(u, v, w) / 6;
 }
 
 double silt_simplex_volume(int dim, const double *c) {
@@ -399,16 +397,6 @@ double silt_cell_h(const silt_nodes *nodes, int n_corner, const int *cell, doubl
     return sum / n_corner;
 }
 
-static void cross(const double *a, const double *b, double *c) {
-    c[0] = a[1] * b[2] - a[2] * b[1];
-    c[1] = a[2] * b[0] - a[0] * b[2];
-    c[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static double dot(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 silt_cell_shape silt_cell_measure(int dim, const double *corner) {
     if (dim != 3) {
         const double *a = corner, *b = corner + 2, *c = corner + 4;
@@ -425,16 +413,16 @@ silt_cell_shape silt_cell_measure(int dim, const double *corner) {
         v[d] = corner[6 + d] - corner[d];
         w[d] = corner[9 + d] - corner[d];
     }
-    cross(v, w, vw);
-    cross(w, u, wu);
-    cross(u, v, uv);
-    const double six = dot(u, vw), uu = dot(u, u), vv = dot(v, v), ww = dot(w, w);
+    silt_cross(v, w, vw);
+    silt_cross(w, u, wu);
+    silt_cross(u, v, uv);
+    const double six = silt_dot(3, u, vw), uu = silt_dot(3, u, u), vv = silt_dot(3, v, v), ww = silt_dot(3, w, w);
     for (int d = 0; d < 3; d++) {
         opposite[d] = vw[d] + wu[d] + uv[d]; // twice the area of the facet that the first node does not have
         centre[d] = uu * vw[d] + vv * wu[d] + ww * uv[d];
     }
-    const double largest = silt_max(silt_max(dot(vw, vw), dot(wu, wu)), silt_max(dot(uv, uv), dot(opposite, opposite)));
-    return (silt_cell_shape){six / 6, six > 0 ? sqrt(dot(centre, centre)) / (2 * six) : HUGE_VAL,
+    const double largest = silt_max(silt_max(silt_dot(3, vw, vw), silt_dot(3, wu, wu)), silt_max(silt_dot(3, uv, uv), silt_dot(3, opposite, opposite)));
+    return (silt_cell_shape){six / 6, six > 0 ? sqrt(silt_dot(3, centre, centre)) / (2 * six) : HUGE_VAL,
                              largest > 0 ? six / sqrt(largest) : 0};
 }
 

@@ -309,8 +309,8 @@ static double refine_facet_measure(const refinement *r, const int *facet) {
     if (r->dim == 2)
         return length;
     refine_apart(r, facet[0], r->nodes->x + 3 * facet[2], e);
-    const double n[3] = {d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]};
-    return 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    silt_cross(d, e, d);
+    return 0.5 * silt_length(3, d);
 }
 
 // inner nodes pressed against a wall, the bed or a body, in space against the free surface

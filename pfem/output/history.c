@@ -16,7 +16,7 @@ struct silt_history {
 };
 
 // a ledger column and the part of the scene that it belongs to
-typedef enum { PART_FLUID, PART_LAW, PART_BED, PART_SEEPAGE, PART_GRAINS, PART_FEED, PART_FLOW } history_part;
+typedef enum { PART_FLUID, PART_LAW, PART_BED, PART_SEEPAGE, PART_GRAINS, PART_FEED, PART_BODIES, PART_FLOW } history_part;
 typedef struct history_column {
     const char *name;
     history_part part;
@@ -76,6 +76,8 @@ static const history_column history_ledger[] = {
     {"sediment_error", PART_GRAINS, offsetof(silt_ledger, sediment_error), false},
     {"left_mass", PART_GRAINS, offsetof(silt_ledger, left_mass), false},
     {"fed_mass", PART_FEED, offsetof(silt_ledger, fed_mass), false},
+    {"body_kinetic_energy", PART_BODIES, offsetof(silt_ledger, body_kinetic), false},
+    {"body_potential_energy", PART_BODIES, offsetof(silt_ledger, body_potential), false},
     {"inflow_mass", PART_FLOW, offsetof(silt_ledger, inflow_mass), false},
     {"outflow_mass", PART_FLOW, offsetof(silt_ledger, outflow_mass), false},
 };
@@ -96,12 +98,8 @@ static bool history_has(const silt_scene *scene, history_part part) {
     switch (part) {
     case PART_FLUID:
         return scene->fluid.on;
-    case PART_LAW: {
-        bool law = scene->bed.on && scene->bed.condition == WALL_LAW;
-        for (int k = 0; k < scene->n_wall; k++)
-            law |= scene->wall[k].condition == WALL_LAW;
-        return scene->fluid.on && law;
-    }
+    case PART_LAW:
+        return scene->fluid.on && silt_scene_law(scene);
     case PART_BED:
         return scene->bed.on;
     case PART_SEEPAGE:
@@ -114,6 +112,8 @@ static bool history_has(const silt_scene *scene, history_part part) {
             fed |= scene->fluid.inlet[k].grains > 0;
         return fed;
     }
+    case PART_BODIES:
+        return silt_scene_moves(scene) > 0;
     case PART_FLOW:
         break;
     }

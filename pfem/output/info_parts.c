@@ -35,11 +35,10 @@ void silt_info_parts(const silt_scene *scene, FILE *to) {
     const silt_fluid_def *fluid = &scene->fluid;
     const silt_costs *cost = &silt_costs_measured[space];
     const double nodes = fluid->on ? parts_nodes(fluid->n_region, fluid->region, fluid->size, space) : 0;
-    bool law = scene->bed.on && scene->bed.condition == WALL_LAW, levels = false, motion = false, feeds = false;
-    for (int i = 0; i < scene->n_wall; i++) {
-        law |= scene->wall[i].condition == WALL_LAW;
+    const bool law = silt_scene_law(scene);
+    bool levels = false, motion = false, feeds = false;
+    for (int i = 0; i < scene->n_wall; i++)
         motion |= scene->wall[i].motion.n_row > 0;
-    }
     for (int i = 0; i < fluid->n_outlet; i++)
         levels |= fluid->outlet[i].level.n_row > 0;
     for (int i = 0; i < fluid->n_inlet; i++) {

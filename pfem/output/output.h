@@ -113,6 +113,25 @@ bool silt_grid_read(silt_grid *grid, const char *out, const char *part, int numb
 void silt_grid_clear(silt_grid *grid);
 static inline int silt_grid_corners(const silt_grid *grid, int cell) { return grid->offset[cell + 1] - grid->offset[cell]; }
 
+// bounds.c -----------------------------------------------------------------------------------------
+/** what a run may be off by: the scene's bounds block */
+typedef enum { BOUND_VOLUME = 0, BOUND_MASS, BOUND_ENERGY, BOUND_COUNT } silt_bound_kind;
+extern const char *const silt_bound_word[BOUND_COUNT];
+typedef struct silt_bound {
+    double worst; // share
+    double time;  // s, when
+} silt_bound;
+typedef struct silt_bounds {
+    silt_bound of[BOUND_COUNT]; // energy: NaN where the history does not tell all of it
+    int64_t rows;               // of history.csv
+    char bad[64];               // its first column with a number that is none
+    double bad_time;            // s
+} silt_bounds;
+/** Reads them from OUT/history.csv. @return false: it has no rows */
+bool silt_bounds_measure(const silt_scene *scene, const char *out, silt_bounds *bounds);
+/** @return true: more than the scene allows; text says by how much and what to do */
+bool silt_bounds_broken(const silt_bounds *bounds, const silt_scene *scene, silt_bound_kind kind, double *allowed, char text[256]);
+
 // summary.c ----------------------------------------------------------------------------------------
 typedef struct silt_summary {
     const char *status;           // "done", "failed", "stopped"
@@ -122,6 +141,7 @@ typedef struct silt_summary {
     double node_steps;            // sum over steps of nodes
     double worst_volume_error, worst_sediment_error, worst_momentum_error;
     int64_t steps, retries, iterations, most_iterations;
+    silt_bounds bounds;           // of the whole run; without rows: not measured
 } silt_summary;
 silt_status silt_summary_write(const char *out, const silt_view *view, const silt_summary *summary, silt_error *err);
 struct fy_document; // of libfyaml

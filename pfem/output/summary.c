@@ -95,6 +95,26 @@ static void summary_machine(FILE *to) {
     free(processor);
 }
 
+// what the ledgers were off by at worst, and which of the scene's bounds that is beyond
+static void summary_bounds(FILE *to, const silt_scene *scene, const silt_bounds *bounds) {
+    const char *comma = "";
+    if (!bounds->rows)
+        return;
+    fputs("  \"bounds\": {", to);
+    for (silt_bound_kind k = 0; k < BOUND_COUNT; k++)
+        silt_json_number(to, silt_bound_word[k], bounds->of[k].worst, ", ");
+    fputs("\"beyond\": [", to);
+    for (silt_bound_kind k = 0; k < BOUND_COUNT; k++) {
+        char text[256];
+        double allowed;
+        if (!silt_bounds_broken(bounds, scene, k, &allowed, text))
+            continue;
+        fprintf(to, "%s\"%s\"", comma, silt_bound_word[k]);
+        comma = ", ";
+    }
+    fputs("]},\n", to);
+}
+
 static void summary_print(FILE *to, const silt_view *view, const silt_summary *summary,
                           const silt_check_result *check) {
     const silt_scene *scene = view->scene;
@@ -134,6 +154,7 @@ static void summary_print(FILE *to, const silt_view *view, const silt_summary *s
     silt_json_number(to, "worst_volume_error", summary->worst_volume_error, ",\n  ");
     silt_json_number(to, "worst_sediment_error", summary->worst_sediment_error, ",\n  ");
     silt_json_number(to, "worst_momentum_error", summary->worst_momentum_error, ",\n");
+    summary_bounds(to, scene, &summary->bounds);
     fputs("  \"bodies\": [", to);
     for (int i = 0; view->bodies && i < view->bodies->count; i++) {
         const struct silt_body *b = &view->bodies->body[i];

@@ -379,6 +379,32 @@ static void verify_print(FILE *to, int width, double value) {
         fprintf(to, " %*.5g", width, value);
 }
 
+static void verify_line(FILE *to, const silt_check_result *r) {
+    fprintf(to, "%-24s", r->name);
+    verify_print(to, 14, r->value);
+    verify_print(to, 14, r->reference);
+    verify_print(to, 11, r->error);
+    verify_print(to, 11, r->tolerance);
+    fprintf(to, "  %s%s%s%s\n", r->pass ? "pass" : "FAIL", *r->note ? " (" : "", r->note, *r->note ? ")" : "");
+}
+
+// ledgers beyond the scene's bounds fail as checks do. @return how many
+static int verify_bounds(const silt_scene *scene, const char *out, FILE *to) {
+    silt_bounds bounds;
+    int n = 0;
+    silt_bounds_measure(scene, out, &bounds);
+    for (silt_bound_kind k = 0; k < BOUND_COUNT; k++) {
+        char name[32];
+        silt_check_result r = {.name = name, .value = bounds.of[k].worst, .error = bounds.of[k].worst};
+        if (!silt_bounds_broken(&bounds, scene, k, &r.tolerance, r.note))
+            continue;
+        snprintf(name, sizeof name, "bounds.%s", silt_bound_word[k]);
+        verify_line(to, &r);
+        n++;
+    }
+    return n;
+}
+
 silt_status silt_verify(const char *out, FILE *to, silt_error *err) {
     char *path = silt_text("%s/scene.yaml", out);
     silt_scene *scene = NULL;
@@ -396,17 +422,13 @@ silt_status silt_verify(const char *out, FILE *to, silt_error *err) {
     else
         fprintf(to, "%-24s %14s %14s %11s %11s\n", "check", "value", "reference", "error", "tolerance");
     for (int i = 0; i < scene->n_check; i++) {
-        const silt_check_result *r = &result[i];
-        fprintf(to, "%-24s", r->name);
-        verify_print(to, 14, r->value);
-        verify_print(to, 14, r->reference);
-        verify_print(to, 11, r->error);
-        verify_print(to, 11, r->tolerance);
-        fprintf(to, "  %s%s%s%s\n", r->pass ? "pass" : "FAIL", *r->note ? " (" : "", r->note, *r->note ? ")" : "");
-        failed += !r->pass;
+        verify_line(to, &result[i]);
+        failed += !result[i].pass;
     }
-    if (failed)
-        status = silt_fail(err, SILT_FAILED, "%s: %d of %d checks failed", out, failed, scene->n_check);
+    const int beyond = verify_bounds(scene, out, to);
+    if (failed || beyond)
+        status = silt_fail(err, SILT_FAILED, beyond ? "%s: %d of %d checks failed, %d of the ledgers beyond their bounds" : "%s: %d of %d checks failed",
+                           out, failed, scene->n_check, beyond);
 done:
     free(result);
     silt_scene_free(&scene);

@@ -38,7 +38,7 @@ static double profile_measure(int dim, const double *a, const double *b, const d
     if (dim == 2)
         return u[0] * v[1] - u[1] * v[0];
     const double w[3] = {d[0] - a[0], d[1] - a[1], d[2] - a[2]};
-    return u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2]) + u[2] * (v[0] * w[1] - v[1] * w[0]);
+    return silt_triple(u, v, w);
 }
 
 static bool profile_cell(const profile_frame *f, int cell) {

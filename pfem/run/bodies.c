@@ -56,10 +56,7 @@ void silt_run_body_velocity(const struct silt_body *body, const double *x, int d
 }
 
 int silt_run_bodies_free(const silt_run *run) {
-    int n = 0;
-    for (int b = 0; b < run->scene->n_body && run->coupling; b++)
-        n += run->scene->body[b].motion != MOTION_FIXED;
-    return n;
+    return run->coupling ? silt_scene_moves(run->scene) : 0;
 }
 
 // the body as it is when it goes on for dt as it does
@@ -79,6 +76,23 @@ static struct silt_body coasting(const struct silt_body *body, double dt) {
 
 /** Velocities of the nodes on a body that goes from one pose and velocity to another: that of the step's momentum, theta of the way from
  * the first velocity to the second, about the place half way; and what carries the nodes beside it to where they come. */
+static void rigid_motion(const silt_run *run, int i, const struct silt_body *a, const struct silt_body *b, double theta, double *v, double *shift) {
+    const int D = silt_nodes_dim(&run->nodes);
+    const double *x = run->nodes.x + D * i;
+    double end[3], arm[3] = {0}, spin[3], turning[3];
+    silt_run_body_turn(a, b, x, D, end);
+    for (int d = 0; d < D; d++)
+        arm[d] = 0.5 * (x[d] - a->x[d] + end[d] - b->x[d]);
+    for (int d = 0; d < 3; d++)
+        spin[d] = a->w[d] + theta * (b->w[d] - a->w[d]);
+    cross(spin, arm, turning);
+    for (int d = 0; d < D; d++) {
+        v[d] = a->v[d] + theta * (b->v[d] - a->v[d]) + turning[d];
+        shift[d] = (end[d] - x[d]) / run->dt - v[d];
+    }
+}
+
+// Slaves of films have the velocity alone: walls, which they stay on, carry their places.
 static void node_motion(silt_run *run, const struct silt_body *before, const struct silt_body *now, double theta) {
     const silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
@@ -87,19 +101,12 @@ static void node_motion(silt_run *run, const struct silt_body *before, const str
     for (int i = 0; i < nodes->count; i++) {
         if (nodes->kind[i] != NODE_BODY)
             continue;
-        const struct silt_body *a = &before[nodes->owner[i]], *b = &now[nodes->owner[i]];
-        double end[3], arm[3] = {0}, spin[3], turning[3];
-        silt_run_body_turn(a, b, nodes->x + D * i, D, end);
-        for (int d = 0; d < D; d++)
-            arm[d] = 0.5 * (nodes->x[D * i + d] - a->x[d] + end[d] - b->x[d]);
-        for (int d = 0; d < 3; d++)
-            spin[d] = a->w[d] + theta * (b->w[d] - a->w[d]);
-        cross(spin, arm, turning);
-        for (int d = 0; d < D; d++) {
-            const double v = a->v[d] + theta * (b->v[d] - a->v[d]) + turning[d];
-            run->body_velocity[D * i + d] = v;
-            run->body_shift[D * i + d] = (end[d] - nodes->x[D * i + d]) / run->dt - v;
-        }
+        const int own = nodes->owner[i];
+        rigid_motion(run, i, &before[own], &now[own], theta, run->body_velocity + D * i, run->body_shift + D * i);
+    }
+    for (int k = 0; run->film && k < run->film->n_slave; k++) {
+        const int i = run->film->slave[k], own = run->film->slave_body[k];
+        rigid_motion(run, i, &before[own], &now[own], theta, run->body_velocity + D * i, run->body_shift + D * i);
     }
 }
 
@@ -112,32 +119,75 @@ void silt_run_bodies_coast(silt_run *run) {
         run->body_before[b] = bodies->body[b];
         run->body_after[b] = coasting(&bodies->body[b], run->dt);
     }
+    run->film = silt_uplift_find(&run->uplift, run);
     node_motion(run, run->body_before, run->body_after, 1);
-    silt_uplift_find(&run->uplift, run);
-    SILT_RESERVE(run->gap_force, run->gap_force_capacity, silt_nodes_dim(&run->nodes) * (run->nodes.count + 1));
-    run->gaps = silt_uplift_mouths(run->uplift, run, run->gap_force);
 }
 
-// force and torque of the nodes' `push` on every body, about its place half way through the step; ROW per body. @param sign  of it
-static void sum_bodies(const silt_run *run, const double *push, double sign, double *out) {
+// from body b's place half way through the step to a node's then; those under films are none of the water's mesh
+static void node_arm(const silt_run *run, int b, int i, double arm[3]) {
+    const int D = silt_nodes_dim(&run->nodes);
+    arm[2] = 0;
+    for (int d = 0; d < D; d++) {
+        const int k = D * i + d;
+        const double at = run->mesh.wet[i] ? run->fluid.x_mid[k] : run->nodes.x[k] + 0.5 * run->dt * (run->body_velocity[k] + run->body_shift[k]);
+        arm[d] = at - 0.5 * (run->body_before[b].x[d] + run->body_after[b].x[d]);
+    }
+}
+
+// a force on body b at its node, or its slave, i
+static void force_add(const silt_run *run, int b, int i, const double force[3], double *out) {
+    double arm[3], torque[3];
+    node_arm(run, b, i, arm);
+    cross(arm, force, torque);
+    for (int d = 0; d < 3; d++) {
+        out[ROW * b + d] += force[d];
+        out[ROW * b + 3 + d] += torque[d];
+    }
+}
+
+/** Force and torque of the water on every body, about its place half way through the step; ROW per body. Slaves give it what walls do not
+ * take. */
+static void sum_bodies(const silt_run *run, double *out) {
     const silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
+    const double *reaction = run->fluid.reaction;
     memset(out, 0, (size_t)(ROW * run->n_body_before) * sizeof(double));
     for (int i = 0; i < run->fluid.n_node; i++) {
-        if (nodes->kind[i] != NODE_BODY || !run->mesh.wet[i])
-            continue;
-        const int b = nodes->owner[i];
-        double arm[3] = {0}, force[3] = {0}, torque[3];
-        for (int d = 0; d < D; d++) {
-            arm[d] = run->fluid.x_mid[D * i + d] - 0.5 * (run->body_before[b].x[d] + run->body_after[b].x[d]);
-            force[d] = sign * push[D * i + d];
-        }
-        cross(arm, force, torque);
-        for (int d = 0; d < 3; d++) {
-            out[ROW * b + d] += force[d];
-            out[ROW * b + 3 + d] += torque[d];
-        }
+        double force[3] = {0};
+        for (int d = 0; d < D; d++)
+            force[d] = -reaction[D * i + d];
+        if (nodes->kind[i] == NODE_BODY)
+            force_add(run, nodes->owner[i], i, force, out);
     }
+    for (int k = 0; run->film && k < run->film->n_slave; k++) {
+        double force[3] = {0};
+        for (int d = 0; d < D; d++)
+            force[d] = -reaction[D * run->film->slave[k] + d];
+        silt_film_free_part(run->film, k, D, force);
+        force_add(run, run->film->slave_body[k], run->film->slave[k], force, out);
+    }
+}
+
+// what slaves gave to bodies is none of the walls'
+static void slaves_settle(silt_run *run) {
+    const int D = silt_nodes_dim(&run->nodes);
+    for (int k = 0; run->film && k < run->film->n_slave; k++) {
+        double *own = run->fluid.reaction + D * run->film->slave[k], part[3];
+        memcpy(part, own, (size_t)D * sizeof(double));
+        silt_film_free_part(run->film, k, D, part);
+        for (int d = 0; d < D; d++)
+            own[d] -= part[d];
+    }
+}
+
+// velocity at a node of a body, or its slave, for a unit of one of the body's modes
+static void mode_at(const silt_run *run, int b, int mode, int i, double v[3]) {
+    double axis[3] = {0}, arm[3];
+    axis[mode % 3] = 1;
+    node_arm(run, b, i, arm);
+    cross(axis, arm, v);
+    if (mode < 3)
+        memcpy(v, axis, sizeof axis);
 }
 
 // velocity of the nodes on body b for a unit of one of its modes; @return false: it is dry
@@ -147,20 +197,27 @@ static bool mode_motion(const silt_run *run, int b, int mode, double *motion) {
     bool wet = false;
     memset(motion, 0, (size_t)(D * nodes->count) * sizeof(double));
     for (int i = 0; i < run->fluid.n_node; i++) {
-        if (nodes->kind[i] != NODE_BODY || nodes->owner[i] != b || !run->mesh.wet[i])
+        if (nodes->kind[i] != NODE_BODY || nodes->owner[i] != b)
             continue;
-        wet = true;
-        double axis[3] = {0}, arm[3] = {0}, v[3];
-        axis[mode % 3] = 1;
-        for (int d = 0; d < D; d++)
-            arm[d] = run->fluid.x_mid[D * i + d] - 0.5 * (run->body_before[b].x[d] + run->body_after[b].x[d]);
-        cross(axis, arm, v);
-        for (int d = 0; d < D; d++)
-            motion[D * i + d] = v[d] = mode < 3 ? axis[d] : v[d];
+        wet |= run->mesh.wet[i];
+        double v[3];
+        mode_at(run, b, mode, i, v);
+        memcpy(motion + D * i, v, (size_t)D * sizeof(double));
+        if (!run->mesh.wet[i])
+            continue;
         // along a surface where it slips the water does what it does
         silt_hold_project(&run->fluid, i, v);
         for (int d = 0; d < D; d++)
             motion[D * i + d] -= v[d];
+    }
+    for (int k = 0; run->film && k < run->film->n_slave; k++) {
+        const int i = run->film->slave[k];
+        double v[3];
+        if (run->film->slave_body[k] != b)
+            continue;
+        mode_at(run, b, mode, i, v);
+        silt_film_free_part(run->film, k, D, v);
+        memcpy(motion + D * i, v, (size_t)D * sizeof(double));
     }
     return wet;
 }
@@ -244,38 +301,39 @@ static silt_impedance impedance_begin(const silt_run *run) {
     return z;
 }
 
-/** room for the solves of an impedance */
+/** modes that are solved, of one impedance */
 typedef struct silt_mode_room {
-    double *motion, *reaction, *p, *force; // owned
+    int n_mode, *row;  // owned, the rows
+    silt_mode *mode;   // owned
+    double *motion;    // owned
 } silt_mode_room;
 
-// one solve: the forces of a mode on all bodies are a column
-static silt_status impedance_column(silt_run *run, const silt_step *step, silt_impedance *z, silt_mode_room *room, int row, silt_error *err) {
-    const double per_acceleration = run->fluid.theta * run->dt;
-    if (!mode_motion(run, z->body[row / ROW], row % ROW, room->motion))
-        return SILT_OK;
-    SILT_TRY(silt_fluid_mode(&run->fluid, step, room->motion, room->reaction, room->p, err));
-    sum_bodies(run, room->reaction, per_acceleration, room->force);
-    silt_uplift_force(run->uplift, run, room->p, -per_acceleration, room->force);
-    for (int o = 0; o < z->n; o++)
-        for (int r = 0; r < ROW; r++)
-            z->water[(ROW * o + r) * z->size + row] = room->force[ROW * z->body[o] + r];
-    return SILT_OK;
+static void room_forget(silt_mode_room *room) {
+    for (int m = 0; m < room->n_mode; m++)
+        silt_mode_clear(&room->mode[m]);
+    room->n_mode = 0;
 }
 
-static void impedance_symmetric(silt_impedance *z) {
-    for (int r = 0; r < z->size; r++)
-        for (int c = 0; c < r; c++) {
-            double *a = &z->water[r * z->size + c], *b = &z->water[c * z->size + r];
-            *a = *b = 0.5 * (*a + *b);
-        }
+// One solve: what the mode has with those before it, the work of its forces on their motions, is a row and a column.
+static silt_status impedance_column(silt_run *run, const silt_step *step, silt_impedance *z, silt_mode_room *room, int row, silt_error *err) {
+    const double per_acceleration = run->fluid.theta * run->dt;
+    silt_mode *mode = &room->mode[room->n_mode];
+    if (!mode_motion(run, z->body[row / ROW], row % ROW, room->motion))
+        return SILT_OK;
+    room->row[room->n_mode++] = row;
+    SILT_TRY(silt_fluid_mode(&run->fluid, step, room->motion, 0, mode, err));
+    for (int m = 0; m < room->n_mode; m++) {
+        const int other = room->row[m];
+        z->water[other * z->size + row] = per_acceleration * silt_mode_work(&run->fluid, &room->mode[m], mode);
+        z->water[row * z->size + other] = per_acceleration * silt_mode_work(&run->fluid, mode, &room->mode[m]);
+    }
+    return SILT_OK;
 }
 
 // every mode of every body, with what they do to each other
 static silt_status impedance_whole(silt_run *run, const silt_step *step, silt_impedance *z, silt_mode_room *room, silt_error *err) {
     for (int l = 0; l < z->n_live; l++)
         SILT_TRY(impedance_column(run, step, z, room, z->live[l], err));
-    impedance_symmetric(z);
     return SILT_OK;
 }
 
@@ -324,9 +382,9 @@ static silt_status impedance_kept(silt_run *run, const silt_step *step, silt_imp
             continue;
         for (int m = 0; m < ROW; m++)
             SILT_TRY(impedance_column(run, step, z, room, ROW * k + m, err));
+        room_forget(room);
         for (int r = 0; r < ROW; r++)
-            for (int c = 0; c < ROW; c++)
-                block[ROW * r + c] = 0.5 * (z->water[(ROW * k + r) * z->size + ROW * k + c] + z->water[(ROW * k + c) * z->size + ROW * k + r]);
+            memcpy(block + ROW * r, z->water + (ROW * k + r) * z->size + ROW * k, ROW * sizeof *block);
         block_turned(back, block, kept->inertia);
         kept->wet = wet;
     }
@@ -341,14 +399,13 @@ static silt_status impedance_kept(silt_run *run, const silt_step *step, silt_imp
 
 static silt_status impedance_solve(silt_run *run, const silt_step *step, silt_impedance *z, silt_error *err) {
     const int D = silt_nodes_dim(&run->nodes);
-    const size_t n = (size_t)(D * run->nodes.count) + 1;
-    silt_mode_room room = {.motion = silt_alloc(n, sizeof(double)), .reaction = silt_alloc(n, sizeof(double)), .p = silt_alloc(n, sizeof(double)),
-                           .force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof(double))};
+    const size_t n = (size_t)(D * run->nodes.count) + 1, m = (size_t)z->size + 1;
+    silt_mode_room room = {.row = silt_alloc(m, sizeof(int)), .mode = silt_alloc(m, sizeof(silt_mode)), .motion = silt_alloc(n, sizeof(double))};
     const silt_status status = (D == 3 && z->n > 1 ? impedance_kept : impedance_whole)(run, step, z, &room, err);
+    room_forget(&room);
+    free(room.row);
+    free(room.mode);
     free(room.motion);
-    free(room.reaction);
-    free(room.force);
-    free(room.p);
     return status;
 }
 
@@ -438,6 +495,16 @@ static silt_status impedance_sane(const silt_run *run, const silt_impedance *z, 
     return SILT_OK;
 }
 
+silt_status silt_run_bodies_inertia(silt_run *run, const silt_step *step, int *size, double **inertia, silt_error *err) {
+    silt_impedance z = impedance_begin(run);
+    const silt_status status = impedance_solve(run, step, &z, err);
+    *size = z.size;
+    *inertia = z.water;
+    z.water = NULL;
+    impedance_clear(&z);
+    return status;
+}
+
 // B and R of the step from the force on bodies that go on as they do
 static silt_status impedance_tell(silt_run *run, silt_impedance *z, const double *force, silt_error *err) {
     silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
@@ -496,14 +563,14 @@ done:
 silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_error *err) {
     SILT_RESERVE(run->body_carry, run->body_carry_capacity, run->n_body_before + 1);
     double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force);
-    sum_bodies(run, run->fluid.reaction, -1, force);
-    silt_uplift_force(run->uplift, run, run->nodes.p, 1, force);
+    sum_bodies(run, force);
     if (!silt_run_bodies_free(run)) {
         silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
         for (int b = 0; b < bodies->count; b++) {
             memcpy(bodies->body[b].force, force + ROW * b, sizeof bodies->body[b].force);
             memcpy(bodies->body[b].torque, force + ROW * b + 3, sizeof bodies->body[b].torque);
         }
+        slaves_settle(run);
         free(force);
         return SILT_OK;
     }
@@ -588,8 +655,8 @@ silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_er
     held_end(&held);
     SILT_TRY(status);
     double *force = silt_alloc((size_t)(ROW * run->n_body_before) + 1, sizeof *force);
-    sum_bodies(run, run->fluid.reaction, -1, force);
-    silt_uplift_force(run->uplift, run, run->nodes.p, 1, force);
+    sum_bodies(run, force);
+    slaves_settle(run);
     run->body_error = 0;
     for (int b = 0; b < run->n_body_before; b++) {
         struct silt_body *body = &bodies->body[b];

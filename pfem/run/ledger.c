@@ -53,6 +53,27 @@ static void ledger_cells(silt_run *run) {
     }
 }
 
+// energy of the bodies that move; those that are fixed have none
+static void ledger_bodies(silt_run *run) {
+    silt_ledger *ledger = &run->ledger;
+    const silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    ledger->body_kinetic = ledger->body_potential = 0;
+    for (int i = 0; bodies && i < bodies->count; i++) {
+        const struct silt_body *b = &bodies->body[i];
+        if (run->scene->body[i].motion == MOTION_FIXED)
+            continue;
+        double w[3], spin = b->inertia[2] * silt_square(b->w[2]); // in the plane
+        if (run->scene->dimension == 3) {
+            const double *J = b->inertia; // xx, yy, zz, xy, xz, yz
+            silt_turn(b->q, true, b->w, w);
+            spin = J[0] * w[0] * w[0] + J[1] * w[1] * w[1] + J[2] * w[2] * w[2] +
+                   2 * (J[3] * w[0] * w[1] + J[4] * w[0] * w[2] + J[5] * w[1] * w[2]);
+        }
+        ledger->body_kinetic += 0.5 * (b->mass * silt_dot(3, b->v, b->v) + spin);
+        ledger->body_potential -= b->mass * silt_dot(3, b->x, run->scene->gravity);
+    }
+}
+
 void silt_run_ledger(silt_run *run) {
     silt_ledger *ledger = &run->ledger;
     const silt_nodes *nodes = &run->nodes;
@@ -121,6 +142,7 @@ void silt_run_ledger(silt_run *run) {
         }
         for (int d = 0; d < 3 && moving > 0; d++)
             ledger->grain_velocity[d] /= moving;
+        ledger_bodies(run);
         ledger->grain_count = grains->count + run->n_waiting;
         // summed with care: the sediment must close to rounding
         double carry = 0;

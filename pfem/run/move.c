@@ -4,7 +4,7 @@
 static bool slip_on_bodies(const silt_scene *scene) {
     bool any = false;
     for (int b = 0; b < scene->n_body; b++)
-        any |= scene->body[b].condition == WALL_SLIP;
+        any |= silt_body_slips(&scene->body[b]);
     return any;
 }
 
@@ -26,7 +26,7 @@ void silt_run_prescribe(silt_run *run) {
                 v[d] = factor * inlet->velocity[d];
         } else if (nodes->kind[i] == NODE_BODY && bodies) {
             const struct silt_body *body = &bodies->body[nodes->owner[i]];
-            if (scene->body[nodes->owner[i]].condition == WALL_SLIP) {
+            if (silt_body_slips(&scene->body[nodes->owner[i]])) {
                 double *own = run->body_start + D * i;
                 silt_run_body_velocity(body, nodes->x + D * i, D, own);
                 if (i < run->mesh.n_node && run->mesh.wet[i]) // it has a velocity of its own along the surface
@@ -133,7 +133,7 @@ static void place_bodies(silt_run *run) {
         memcpy(nodes->x + D * i, place, (size_t)D * sizeof(double));
         double own[3];
         silt_run_body_velocity(now, place, D, own);
-        if (run->scene->body[nodes->owner[i]].condition == WALL_SLIP && run->mesh.wet[i])
+        if (silt_body_slips(&run->scene->body[nodes->owner[i]]) && run->mesh.wet[i])
             silt_hold_replace(&run->fluid, i, own, nodes->v + D * i);
         else
             memcpy(nodes->v + D * i, own, (size_t)D * sizeof(double));

@@ -62,9 +62,15 @@ static double crossing_time(const silt_run *run) {
     const silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
     const double spray = spray_speed(run);
+    const silt_body_state *bodies = run->step == 0 && run->scene->n_body && run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
     double least = HUGE_VAL;
     for (int i = 0; i < nodes->count; i++) {
         double speed = silt_length(D, nodes->v + D * i);
+        if (nodes->kind[i] == NODE_BODY && bodies) { // its nodes have no velocity yet
+            double v[3] = {0};
+            silt_run_body_velocity(&bodies->body[nodes->owner[i]], nodes->x + D * i, D, v);
+            speed = silt_max(speed, silt_length(D, v));
+        }
         if (nodes->kind[i] == NODE_CORNER || nodes->kind[i] == NODE_BED || speed == 0)
             continue;
         const bool water = nodes->kind[i] == NODE_FLUID, wet = i < run->mesh.n_node && run->mesh.wet[i];

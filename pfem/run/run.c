@@ -4,7 +4,6 @@
 #include "bed_law.h"
 #include "run.h"
 
-#define VOLUME_OFF 0.05    // largest share of the water that may be off without a word
 #define BED_Y_PLUS 5.0     // largest height of the first cell in wall units: the viscous sublayer
 #define PRESSURE_SLOPE 0.2 // largest share by which output carries the pressure on to the end of the step
 
@@ -119,7 +118,7 @@ static void water_restore(silt_run *run) {
     silt_stiff_forget(run->fluid.stiff);
 }
 
-static silt_step water_see(silt_run *run) {
+silt_step silt_run_see(silt_run *run) {
     const silt_scene *scene = run->scene;
     silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
                       .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
@@ -130,7 +129,7 @@ static silt_step water_see(silt_run *run) {
         step.body_shift = run->body_shift;
     }
     step.body_start = run->body_start;
-    step.gap_force = run->gaps ? run->gap_force : NULL;
+    step.film = run->film;
     return step;
 }
 
@@ -162,7 +161,7 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
         if (scene->n_body)
             silt_run_bodies_coast(run);
-        const silt_step step = water_see(run);
+        const silt_step step = silt_run_see(run);
         silt_clock_to(CLOCK_assemble);
         status = silt_fluid_step(&run->fluid, &step, err);
         silt_clock_to(CLOCK_rest);
@@ -278,6 +277,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     const double wanted = silt_run_pace(run);
     if (step_sane(run, wanted, err) != SILT_OK) {
         run->whole = false; // not worth a checkpoint
+        run->back = -1;
         return SILT_FAILED;
     }
     int64_t n = step_choose(run, wanted);
@@ -310,15 +310,18 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         });
         const bool moved = status == SILT_OK;
         if (moved && scene->fluid.on && silt_run_bodies_free(run)) {
-            const silt_step step = water_see(run);
+            const silt_step step = silt_run_see(run);
             silt_clock_to(CLOCK_assemble);
             status = silt_run_bodies_answer(run, &step, err);
             silt_clock_to(CLOCK_rest);
         }
         if (status == SILT_OK)
             break;
-        if (!grains_again(run, &n, attempt, err))
+        if (!grains_again(run, &n, attempt, err)) {
+            // the step may be a good one for another worker, with the same bits where the set-ups are the same
+            run->back = moved ? run->back : run->back_set_up;
             return moved ? water_gave_up(run, attempt + 1, n <= 1, err) : silt_run_grains_failed(run, status, err);
+        }
     }
     if (scene->fluid.on && silt_run_bodies_free(run) && silt_seep_on(scene))
         silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
@@ -371,7 +374,7 @@ silt_status silt_run_measure(silt_run *run, silt_error *err) {
 // water that is owed is not lost, but where there is so much of it the cells are too large for what it does: told once a run
 static void volume_held(silt_run *run) {
     const silt_ledger *ledger = &run->ledger;
-    if (run->volume_told || !run->scene->fluid.on || !(fabs(ledger->volume_error) > VOLUME_OFF))
+    if (run->volume_told || !run->scene->fluid.on || !(fabs(ledger->volume_error) > run->scene->bounds.volume))
         return;
     run->volume_told = true;
     silt_run_warn(run, "the water's volume is off by %.3g %%, %.3g m3 of it are owed and come back later: the cells are too large for what the water "
@@ -386,8 +389,9 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
     silt_view view;
     silt_run_view(run, &view);
     silt_gauges_read(run->gauges, &view, run->gauge);
-    SILT_TRY(silt_history_row(run->history, &view, run->gauge, err));
-    if (run->tick == 0 && run->offset == 0)
+    if (!run->again)
+        SILT_TRY(silt_history_row(run->history, &view, run->gauge, err));
+    if (run->tick == 0 && run->offset == 0 && !run->again)
         SILT_TRY(silt_frame_write(run->out, (int)run->frame, &view, err));
     for (int k = 0; k < PHASE_COUNT; k++)
         run->summary.phase[k] += run->phase[k];
@@ -397,6 +401,8 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
         run->summary.most_iterations = run->fluid.iterations;
     run->summary.steps++;
     run->whole = true;
+    run->back = run->step;
+    run->back_set_up = silt_run_set_up_due(run, run->dt) ? run->step : run->back_set_up;
     double seconds[CLOCK_COUNT];
     silt_clock_read(seconds);
     run->output_seconds = seconds[CLOCK_output];
@@ -448,7 +454,6 @@ void silt_run_free(silt_run *run) {
     free(run->body_carry);
     free(run->body_water);
     silt_uplift_free(&run->uplift);
-    free(run->gap_force);
     free(run->x_old);
     free(run->p_old);
     free(run->p_shown);

@@ -83,6 +83,8 @@ struct silt_run {
     int64_t saved_step; // of the newest checkpoint, -1: none yet
     double saved_time;
     bool whole;         // the state is that of the end of a step, nothing of the next one has been done to it
+    int64_t back, back_set_up; // step whose end a run that fails goes back to, -1: none is worth it; the last one with set_up_due
+    bool again;         // goes over steps that are in the folder already: writes neither rows nor frames, warns of nothing
     int lock;           // descriptor that keeps other runs out of the folder, -1: none
 
     silt_ledger ledger;
@@ -98,10 +100,9 @@ struct silt_run {
     struct silt_body *body_before; // owned, poses at the start of the step
     int body_after_capacity, body_velocity_capacity, body_shift_capacity, body_carry_capacity;
     struct silt_body *body_after;  // owned, poses at its end, as far as they are known
-    double *body_velocity, *body_shift, *gap_force, *body_start; // owned, dim per node, see silt_step
+    double *body_velocity, *body_shift, *body_start; // owned, dim per node, see silt_step
     int body_start_capacity;
-    int gap_force_capacity;
-    bool gaps;                     // there are any
+    silt_film *film;               // borrowed from uplift, NULL: there is none
     silt_body_water *body_water;   // owned, in space with more bodies than one
     int body_water_capacity;
     double (*body_carry)[6];       // owned, N s and N m s per m: what the water gave bodies and they have not received yet
@@ -130,6 +131,8 @@ struct silt_run {
 silt_status silt_run_open(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock, silt_error *err);
 
 // run.c, besides silt_run_advance: clocks are there to be read until its next call --------------------
+/** the step as the water sees it */
+silt_step silt_run_see(silt_run *run);
 /** what output sees of the run */
 void silt_run_view(silt_run *run, silt_view *view);
 /** porosity, ledger and pressure of a state, for row and frame */
@@ -158,18 +161,17 @@ void silt_run_bodies_coast(silt_run *run);
 /** After it, before the discrete elements move: the water's force on bodies and its inertia around them, for the substeps to come.
  * SILT_FAILED: the force cannot be. */
 silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_error *err);
+/** The water's inertia at the free bodies after its step, as the solves give it: kg, kg m, kg m2, size by size, six rows a body. *inertia is
+ * owned by the caller, also of an error. */
+silt_status silt_run_bodies_inertia(silt_run *run, const silt_step *step, int *size, double **inertia, silt_error *err);
 /** After the discrete elements have moved: the water's step again, with that motion of the bodies; what its force on them differs
  * from what they received is carried to the next step. */
 silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_error *err);
 
 // uplift.c --------------------------------------------------------------------------------------------
-/** Where bodies have nothing of the water's mesh on them, but no air either; of the present mesh. Makes *uplift at first. Nodes at
- * mouths that are shut are no free surface any more, until silt_uplift_open. */
-void silt_uplift_find(silt_uplift **uplift, silt_run *run);
-/** out, 6 numbers a body: += factor times force and torque of the pressure there, from p of the nodes around */
-void silt_uplift_force(const silt_uplift *uplift, const silt_run *run, const double *p, double factor, double *out);
-/** out, 2 per node: the pressure there on the water's nodes at its mouths. @return false: there are none */
-bool silt_uplift_mouths(const silt_uplift *uplift, const silt_run *run, double *out);
+/** Films of water between bodies and what they are near to, of the present mesh and places. Makes *uplift at first. Nodes at mouths that
+ * are shut are no free surface any more, until silt_uplift_open. @return borrowed from it; NULL: there are none */
+silt_film *silt_uplift_find(silt_uplift **uplift, silt_run *run);
 void silt_uplift_open(const silt_uplift *uplift, silt_run *run); // the step is over
 void silt_uplift_free(silt_uplift **uplift);
 

@@ -156,7 +156,19 @@ static bool water_deep(const silt_mesh *mesh) {
     return deep;
 }
 
-// Regions and clouds too thin for any cell hold no water; those that are coarsely met are told. Where bed or bodies stand in regions, or
+// m, the least of width, length and height of the water
+static double water_extent(const silt_run *run) {
+    const int D = silt_nodes_dim(&run->nodes);
+    double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, least = HUGE_VAL;
+    for (int i = 0; i < run->nodes.count; i++)
+        if (run->mesh.wet[i])
+            box_span(lo, hi, run->nodes.x + D * i, D, 0);
+    for (int d = 0; d < D; d++)
+        least = silt_min(least, hi[d] - lo[d]);
+    return run->mesh.n_cell > 0 ? least : HUGE_VAL;
+}
+
+// Regions and clouds too thin for any cell hold no water, nor those thinner than one without a node inside; those that are coarsely met are told. Where bed or bodies stand in regions, or
 // the water is a cloud, nobody knows beforehand how much there is.
 static silt_status water_there(const silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
@@ -168,7 +180,11 @@ static silt_status water_there(const silt_run *run, silt_error *err) {
                                                          "wider than a cell; smaller fluid.size", fluid->size);
     if (fluid->cloud)
         return SILT_OK;
-    if (fluid->n_inlet == 0 && !water_deep(&run->mesh))
+    const bool deep = fluid->n_inlet > 0 || water_deep(&run->mesh);
+    if (!deep && fluid->n_size == 0 && water_extent(run) < fluid->size * (1 - 1e-6))
+        return silt_fail(err, SILT_INPUT, "key 'fluid.regions': found water that is %.3g m thin, with no node inside, allowed a cell of fluid.size = %g m at least; "
+                                          "smaller fluid.size", water_extent(run), fluid->size);
+    if (!deep)
         silt_run_warn(run, "no node lies inside of the water, whose pressure is then that of its walls and its surface alone: it is no deeper than "
                            "fluid.size = %g m; smaller fluid.size", fluid->size);
     if (scene->bed.on || scene->n_body)
@@ -182,18 +198,6 @@ static silt_status water_there(const silt_run *run, silt_error *err) {
         silt_run_warn(run, "the water's regions hold %.4g m%d, its cells %.4g at the start: smaller fluid.size, or regions that overlap", wanted, scene->dimension,
                       made);
     return SILT_OK;
-}
-
-// m, the least of width, length and height of the water
-static double water_extent(const silt_run *run) {
-    const int D = silt_nodes_dim(&run->nodes);
-    double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, least = HUGE_VAL;
-    for (int i = 0; i < run->nodes.count; i++)
-        if (run->mesh.wet[i])
-            box_span(lo, hi, run->nodes.x + D * i, D, 0);
-    for (int d = 0; d < D; d++)
-        least = silt_min(least, hi[d] - lo[d]);
-    return run->mesh.n_cell > 0 ? least : HUGE_VAL;
 }
 
 // grains are points to the water, which takes their volume by a kernel some diameters wide

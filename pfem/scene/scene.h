@@ -37,7 +37,7 @@ typedef enum {
     WALL_NO_SLIP = 0,
     WALL_SLIP,
     WALL_LAW, // slip with the traction of the logarithmic law of the wall
-    WALL_DEFAULT, // wall law where the flow is turbulent, no-slip where it is laminar; replaced while reading
+    WALL_DEFAULT, // wall law where the flow is turbulent, no-slip where it is laminar, on bodies slip where cells are too coarse for it; replaced while reading
 } silt_condition;
 /** how a wall is given; a 2-D box becomes a closed polyline while reading */
 typedef enum { WALL_POLYLINE = 1, WALL_BOX, WALL_SURFACE } silt_wall_form;
@@ -331,7 +331,8 @@ typedef struct silt_body_def {
     double density; // kg/m3
     double velocity[3];
     double spin[3]; // rad/s, 3-D, at the start
-    silt_condition condition; // of water on it, WALL_NO_SLIP or WALL_SLIP
+    silt_condition condition; // of water on it
+    double roughness; // m, equivalent sand roughness of the wall law
     silt_motion motion;
     silt_series path;  // MOTION_PRESCRIBED: a path (silt_path_at)
     double path_scale; // 1, factor on the numbers of its file
@@ -447,6 +448,10 @@ struct silt_scene {
         int64_t steps;         // most steps, 0: no limit
         int retries;           // how often a failed step is halved
     } time;
+    struct {
+        bool on;                     // the block was there; the numbers always are
+        double volume, mass, energy; // shares that a run may be off by before it says so (silt_bounds)
+    } bounds;
     double gravity[3];
     silt_fluid_def fluid;
     int n_wall;
@@ -500,6 +505,18 @@ int silt_sieve_draw(const silt_series *sieve, uint64_t seed, double whole, doubl
 static inline int silt_scene_grains(const silt_scene *s) { return s->grains.n_grain + s->grains.n_filled; }
 static inline const silt_grain_def *silt_scene_grain(const silt_scene *s, int i) {
     return i < s->grains.n_grain ? &s->grains.grain[i] : &s->grains.filled[i - s->grains.n_grain];
+}
+
+/** whether water goes with the body's normal only */
+static inline bool silt_body_slips(const silt_body_def *body) { return body->condition != WALL_NO_SLIP; }
+/** whether something in the scene has the law of the wall (scene_settle.c) */
+bool silt_scene_law(const silt_scene *s);
+/** how many of its bodies move */
+static inline int silt_scene_moves(const silt_scene *s) {
+    int n = 0;
+    for (int i = 0; i < s->n_body; i++)
+        n += s->body[i].motion != MOTION_FIXED;
+    return n;
 }
 
 /** what a scene needs */

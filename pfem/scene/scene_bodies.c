@@ -5,6 +5,7 @@
 #include "scene_keys.h"
 
 enum { BODY_ROUND = 16 }; // corners of half a capsule's end
+static const double body_sunk = 1e-3, body_sunk_cell = 0.05; // of its radius and of fluid.size: how far a body may stand in a wall
 
 static double body_height(const silt_body_def *body) {
     return body->shape == SHAPE_TEMPLE ? 0.8 * body->scale
@@ -122,6 +123,70 @@ static void body_bounds(const silt_body_shape *shape, double lo[2], double hi[2]
     }
 }
 
+// ---------------------------------------------------------------- bodies in walls, in the plane
+
+// how far x lies inside of the outline, m; 0: it does not
+static double outline_depth(const silt_body_shape *shape, const double *x) {
+    double depth = HUGE_VAL;
+    if (!silt_polygon_contains(shape->n_point, shape->point, x))
+        return 0;
+    for (int i = 0; i < shape->n_point; i++)
+        depth = silt_min(depth, silt_segment_distance(shape->point + 3 * i, shape->point + 3 * ((i + 1) % shape->n_point), x));
+    return depth;
+}
+
+static int compare_numbers(const void *a, const void *b) {
+    const double p = *(const double *)a, q = *(const double *)b;
+    return p < q ? -1 : p > q;
+}
+
+// how far the segment a b goes into the body: the middles of the parts into which the outline cuts it, and its ends
+static double body_pierced(const silt_body_shape *shape, const double *a, const double *b) {
+    if (shape->n_point == 0)
+        return silt_max(shape->radius - silt_segment_distance(a, b, shape->centre), 0);
+    if (silt_segment_distance(a, b, shape->centre) >= shape->radius)
+        return 0;
+    double *t = silt_alloc((size_t)shape->n_point + 2, sizeof *t), deepest = 0;
+    int n = 0;
+    t[n++] = 0;
+    t[n++] = 1;
+    for (int i = 0; i < shape->n_point; i++) {
+        const double *c = shape->point + 3 * i, *d = shape->point + 3 * ((i + 1) % shape->n_point);
+        const double u[2] = {b[0] - a[0], b[1] - a[1]}, v[2] = {d[0] - c[0], d[1] - c[1]}, w[2] = {c[0] - a[0], c[1] - a[1]};
+        const double across = u[0] * v[1] - u[1] * v[0];
+        if (across != 0 && silt_segments_meet(a, b, c, d))
+            t[n++] = silt_clamp((w[0] * v[1] - w[1] * v[0]) / across, 0, 1);
+    }
+    qsort(t, (size_t)n, sizeof *t, compare_numbers);
+    for (int k = 0; k < n; k++) {
+        const double middle = k + 1 < n ? 0.5 * (t[k] + t[k + 1]) : 1;
+        deepest = silt_max(deepest, outline_depth(shape, (double[2]){a[0] + middle * (b[0] - a[0]), a[1] + middle * (b[1] - a[1])}));
+    }
+    deepest = silt_max(deepest, outline_depth(shape, a));
+    free(t);
+    return deepest;
+}
+
+// walls that move may have begun to elsewhere; what stands in a closed obstacle altogether is not pierced
+static void body_in_walls(silt_reader *reader, const silt_scene *scene, const silt_body_shape *shape, int i) {
+    const double slack = silt_max(body_sunk * shape->radius, scene->fluid.on ? body_sunk_cell * scene->fluid.size : 0);
+    for (int w = 0; w < scene->n_wall; w++) {
+        const silt_wall *wall = &scene->wall[w];
+        const int n = wall->n_point;
+        double depth = 0;
+        for (int k = 0; k + 1 < n + wall->closed && wall->motion.n_row == 0; k++)
+            depth = silt_max(depth, body_pierced(shape, wall->point + 3 * k, wall->point + 3 * ((k + 1) % n)));
+        const bool inside = wall->closed && silt_polygon_area(n, wall->point) < 0 && silt_polygon_contains(n, wall->point, shape->centre);
+        if (depth > slack || inside)
+            silt_complain(reader, silt_tree_find(reader->root, "bodies.%d.at", i),
+                          inside ? "key 'bodies.%d.at': found body '%s' inside of the obstacle walls.%d, allowed bodies beside the walls"
+                                 : "key 'bodies.%d.at': found body '%s' set into walls.%d by %.3g m, allowed bodies that stand in a wall by no more than %.3g m",
+                          i, scene->body[i].name ? scene->body[i].name : "?", w, depth, slack);
+    }
+}
+
+// ---------------------------------------------------------------- all that is asked
+
 // the reader let capitals through, for gauges
 static bool body_name(const char *name) {
     for (const char *c = name; *c; c++)
@@ -189,6 +254,7 @@ void silt_scene_check_bodies(silt_reader *reader, const silt_scene *scene) {
                                 1e-3 * shape[i].radius, i);
         if (dim == 3)
             continue;
+        body_in_walls(reader, scene, &shape[i], i);
         span[n_span++] = (body_span){shape[i].centre[0] - shape[i].radius, i};
     }
     // overlapping pairs, found along x

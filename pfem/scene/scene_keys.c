@@ -17,7 +17,6 @@ static const silt_word scheme_words[] = {{"implicit", SCHEME_IMPLICIT}, {"fracti
 static const silt_word pressure_words[] = {{"consistent", PRESSURE_CONSISTENT}, {"laplacian", PRESSURE_LAPLACIAN}, {0}};
 static const silt_word condition_words[] = {
     {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
-static const silt_word body_condition_words[] = {{"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {0}};
 static const silt_word wall_condition_words[] = {
     {"default", WALL_DEFAULT}, {"no-slip", WALL_NO_SLIP}, {"slip", WALL_SLIP}, {"wall-law", WALL_LAW}, {0}};
 static const silt_word flow_words[] = {{"turbulent", FLOW_TURBULENT}, {"laminar", FLOW_LAMINAR}, {0}};
@@ -111,6 +110,16 @@ static const silt_key time_rows[] = {
      .doc = "how often a failed step is halved"},
     {0}};
 TABLE(time, "the time block", silt_scene, -1);
+
+static const silt_key bounds_rows[] = {
+    {"volume", KEY_NUMBER, .fallback = BOUNDS_VOLUME, POSITIVE, AT(silt_scene, bounds.volume),
+     .doc = "largest `volume_error` of the water, what is owed included"},
+    {"mass", KEY_NUMBER, .fallback = BOUNDS_MASS, POSITIVE, AT(silt_scene, bounds.mass),
+     .doc = "the same without what is owed: water that is really lost or gained, as a share of start and inflow"},
+    {"energy", KEY_NUMBER, .fallback = BOUNDS_ENERGY, POSITIVE, AT(silt_scene, bounds.energy),
+     .doc = "largest energy of water, grains and bodies above that of the start and the work from outside, as a share of what could move"},
+    {0}};
+TABLE(bounds, "the bounds block", silt_scene, -1);
 
 // regions stand in lists of their own, and in the items of fluid.sizes
 #define REGION_ROWS(type, at)                                                                                          \
@@ -569,8 +578,12 @@ static const silt_key body_rows[] = {
     {"velocity", KEY_POINT, .unit = "m/s", .fallback = "[0, 0]", AT(silt_body_def, velocity), .doc = "at the start"},
     {"spin", KEY_POINT, .unit = "rad/s", .flags = KEY_SPACE, .fallback = "[0, 0, 0]", AT(silt_body_def, spin),
      .doc = "angular velocity at the start"},
-    {"condition", KEY_WORD, .fallback = "no-slip", .words = body_condition_words, AT(silt_body_def, condition),
-     .doc = "of the water at its surface; slip: it goes with the surface's normal only, but sticks to edges, at waterlines and in films of one cell; not for bodies that strike walls"},
+    {"condition", KEY_WORD, .fallback = "default", .words = wall_condition_words, AT(silt_body_def, condition),
+     .doc = "of the water at its surface. slip and wall-law: it goes with the surface's normal only, but sticks to edges, at waterlines and in "
+            "films of one cell. default: wall-law where fluid.flow is turbulent; where it is laminar no-slip if cells show the layer that sticks, "
+            "viscosity/density sqrt(10 h/g) > h^2 with the least size h near bodies, else slip"},
+    {"roughness", KEY_NUMBER, .unit = "m", .fallback = "0", NOT_NEGATIVE, AT(silt_body_def, roughness),
+     .doc = "equivalent sand roughness of the wall law; 0: smooth"},
     {"motion", KEY_WORD, .fallback = "free", .words = motion_words, AT(silt_body_def, motion),
      .doc = "free to move, held where it is, or moved by `path` whatever acts on it"},
     {"path", KEY_SERIES, .flags = KEY_OPTIONAL, AT(silt_body_def, path),
@@ -718,6 +731,8 @@ static const silt_key scene_rows[] = {
     {"periodic", KEY_PAIR, .unit = "m", .flags = KEY_OPTIONAL, AT(silt_scene, period),
      .doc = "the scene repeats in x: what leaves at one end enters at the other"},
     {"time", KEY_BLOCK, .sub = &time_table, .doc = "how long, how often, how fine"},
+    {"bounds", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &bounds_table, .presence = PRESENT_FLAG, .present = offsetof(silt_scene, bounds.on),
+     .doc = "how far the run's ledgers may be off before the run warns of it at its end and `silt verify` fails"},
     {"gravity", KEY_POINT, .unit = "m/s2", AT(silt_scene, gravity),
      .doc = "acceleration, for example [0, -9.81], in 3-D [0, 0, -9.81]"},
     {"fluid", KEY_BLOCK, .flags = KEY_OPTIONAL, .sub = &fluid_table, .presence = PRESENT_FLAG,

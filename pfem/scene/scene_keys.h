@@ -9,6 +9,11 @@
 
 #include "scene.h"
 
+// defaults of the bounds block, as YAML
+#define BOUNDS_VOLUME "0.05"
+#define BOUNDS_MASS "0.02"
+#define BOUNDS_ENERGY "0.01"
+
 // the table of keys ----------------------------------------------------------------------------------
 typedef enum {
     KEY_NUMBER = 1, // double

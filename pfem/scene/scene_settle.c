@@ -220,11 +220,36 @@ static void settle_wall(silt_reader *reader, const silt_scene *scene, silt_wall 
     free(path);
 }
 
+bool silt_scene_law(const silt_scene *scene) {
+    bool law = scene->bed.on && scene->bed.condition == WALL_LAW;
+    for (int i = 0; i < scene->n_wall; i++)
+        law |= scene->wall[i].condition == WALL_LAW;
+    for (int i = 0; i < scene->n_body; i++)
+        law |= scene->body[i].condition == WALL_LAW;
+    return law;
+}
+
 // bodies -----------------------------------------------------------------------------------------------
+// Water that sticks takes half a cell along, which is right where that lies within the layer that viscosity makes: while a body as large as ten
+// cells falls by its own size from rest, it grows to sqrt(nu sqrt(10 h/g)). Coarser cells have the added mass right where water slips.
+static silt_condition body_default(const silt_scene *scene) {
+    const silt_fluid_def *fluid = &scene->fluid;
+    double h = fluid->size;
+    for (int i = 0; i < fluid->n_size; i++)
+        h = fluid->size_at[i].near == NEAR_BODIES ? silt_min(h, fluid->size_at[i].size) : h;
+    if (!fluid->on || fluid->flow == FLOW_TURBULENT)
+        return fluid->on ? WALL_LAW : WALL_NO_SLIP;
+    const double g = silt_length(3, scene->gravity), nu = fluid->viscosity / fluid->density;
+    // nu sqrt(10 h/g) > h^2, without gravity too
+    return silt_square(nu) * 10 > h * h * h * g && nu > 0 ? WALL_NO_SLIP : WALL_SLIP;
+}
+
 static void settle_body(silt_reader *reader, const silt_scene *scene, silt_body_def *body, int i) {
     char *path = silt_text("bodies.%d", i);
     settle_path(reader, silt_tree_find(reader->root, "%s", path), path, "path", &body->path, scene->dimension, body->path_scale,
                 body->baseline);
+    if (body->condition == WALL_DEFAULT)
+        body->condition = body_default(scene);
     for (int k = 0; k < body->n_spring; k++) {
         silt_spring_def *s = &body->spring[k];
         const double way[3] = {s->to[0] - s->at[0], s->to[1] - s->at[1], s->to[2] - s->at[2]};
@@ -449,6 +474,11 @@ static void settle_fills(silt_reader *reader, silt_scene *scene) {
 }
 
 void silt_scene_settle(silt_reader *reader, silt_scene *scene) {
+    if (!scene->bounds.on) {
+        scene->bounds.volume = strtod(BOUNDS_VOLUME, NULL);
+        scene->bounds.mass = strtod(BOUNDS_MASS, NULL);
+        scene->bounds.energy = strtod(BOUNDS_ENERGY, NULL);
+    }
     settle_regions(reader, scene);
     for (int i = 0; i < scene->n_wall; i++)
         settle_wall(reader, scene, &scene->wall[i], i);

@@ -116,6 +116,7 @@ typedef enum {
     RUN_OK = 0,
     RUN_CUT,
     RUN_WARNED,
+    RUN_BEYOND,
     RUN_REFUSED,
     RUN_FAILED,
     RUN_UNFINISHED,

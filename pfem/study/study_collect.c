@@ -108,7 +108,7 @@ int study_slope(const study_table *table, const char *x, const char *y, const ch
     double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
     for (int i = 0; i < table->n; i++) {
         const double a = study_row_number(&table->row[i], x), b = study_row_number(&table->row[i], y);
-        if (study_row_status(&table->row[i]) > RUN_WARNED || !study_row_of(&table->row[i], by, value) || !(a > 0) ||
+        if (study_row_status(&table->row[i]) > RUN_BEYOND || !study_row_of(&table->row[i], by, value) || !(a > 0) ||
             !(b > 0) || !isfinite(a) || !isfinite(b))
             continue;
         const double u = log(a), v = log(b);

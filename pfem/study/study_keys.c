@@ -45,14 +45,13 @@ static const silt_key_table range_table = {"a range of a key", sizeof(study_rang
 
 static const silt_key bounds_rows[] = {
     {"volume", KEY_NUMBER, .fallback = "0.05", POSITIVE, AT(study, bounds.volume),
-     .doc = "largest `worst_volume_error` of summary.json; a run that told of it is warned, not wrong"},
-    {"mass", KEY_NUMBER, .fallback = "0.05", POSITIVE, AT(study, bounds.mass),
-     .doc = "the same with the volume that is owed: what is really lost or gained"},
+     .doc = "largest `volume_error` of history.csv; a run that says at its end that it is beyond its own bounds is `beyond-bounds`, not wrong"},
+    {"mass", KEY_NUMBER, .fallback = "0.02", POSITIVE, AT(study, bounds.mass),
+     .doc = "the same without the volume that is owed: what is really lost or gained"},
     {"sediment", KEY_NUMBER, .fallback = "1e-9", POSITIVE, AT(study, bounds.sediment),
      .doc = "largest `worst_sediment_error`"},
     {"energy", KEY_NUMBER, .fallback = "0.01", POSITIVE, AT(study, bounds.energy),
-     .doc = "largest energy above that at the start and the work done from outside, as a share of what could move; a "
-            "run that warned is no silent breach"},
+     .doc = "largest energy above that at the start and the work done from outside, as a share of what could move"},
     {0}};
 static const silt_key_table bounds_table = {"what a run must keep", 0, bounds_rows, -1, false};
 
@@ -217,7 +216,7 @@ silt_status study_read(study *s, const silt_study_def *def, silt_error *err) {
         silt_keys_read(&reader, &study_keys, s);
         if (!s->bounds.on) {
             s->bounds.volume = 0.05;
-            s->bounds.mass = 0.05;
+            s->bounds.mass = 0.02;
             s->bounds.sediment = 1e-9;
             s->bounds.energy = 0.01;
         }

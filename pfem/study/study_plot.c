@@ -8,7 +8,7 @@
 #include "study.h"
 
 static bool row_counts(const study_row *row) {
-    return study_row_status(row) <= RUN_WARNED;
+    return study_row_status(row) <= RUN_BEYOND;
 }
 
 // a title as gnuplot takes it in double quotes
@@ -164,7 +164,7 @@ static void map_tics(FILE *to, const study *s, char axis, const char *key) {
 
 static bool plot_map(const plot_files *files, const study *s, const study_plot *plot, const study_table *table,
                      const char *x, const char *y) {
-    static const char *const colour[RUN_STATUS_COUNT] = {"#4daf4a", "#a6d96a", "#80cdc1", "#bdbdbd", "#fdae61",
+    static const char *const colour[RUN_STATUS_COUNT] = {"#4daf4a", "#a6d96a", "#80cdc1", "#e6ab02", "#bdbdbd", "#fdae61",
                                                          "#ffff66", "#d73027", "#000000", "#984ea3"};
     FILE *data = fopen(files->data, "w");
     int found[RUN_STATUS_COUNT] = {0};

@@ -7,7 +7,7 @@
 #define MOST_ROWS 60
 
 static const char *const report_mark[RUN_STATUS_COUNT] = {
-    "ok", "cut", "warned", "refused", "**failed**", "**unfinished**", "**hung**", "**crashed**", "**wrong**"};
+    "ok", "cut", "warned", "beyond", "refused", "**failed**", "**unfinished**", "**hung**", "**crashed**", "**wrong**"};
 
 static void report_cell(FILE *to, const char *text) {
     for (; text && *text; text++)
@@ -42,7 +42,7 @@ static void report_counts(FILE *to, const study_table *table, int wanted) {
         }
     fprintf(to, "; %.3g s of processor. ", cpu);
     if (count[RUN_OK] + count[RUN_CUT]) {
-        fprintf(to, "Of those that ended well: largest volume error %.2g", volume);
+        fprintf(to, "Of those that ended within their bounds: largest volume error %.2g", volume);
         if (isfinite(energy))
             fprintf(to, ", largest energy excess %.2g", energy);
         fprintf(to, ".");

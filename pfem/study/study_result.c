@@ -5,173 +5,7 @@
 
 #include "study.h"
 
-// ---------------------------------------------------------------- history.csv
-
-/** what the history tells about */
-typedef struct result_history {
-    int64_t rows;
-    char bad[64];    // first column with a number that is none
-    double bad_time; // s
-    double excess;   // of energy, J (2-D: J/m); NaN: not known for this scene
-    double scale;    // J, what could move
-    double mass;     // largest volume error less what is owed
-} result_history;
-
-// energies that the history can add up: of what moves, less what came from outside
-typedef struct result_energy {
-    bool water, grains; // counted
-    bool worked;        // external_work is all that came from outside
-    int column[6];      // kinetic, potential, owed, external_work, grain_kinetic, grain_potential
-} result_energy;
-
-// number of a row in a column, 0 where the scene has no such column
-static double result_cell(const char *row, int column) {
-    return column < 0 ? 0 : silt_history_number(row, column);
-}
-
-static bool walls_rest(const silt_scene *scene) {
-    for (int i = 0; i < scene->n_wall; i++)
-        if (scene->wall[i].motion.n_row > 0 || silt_length(3, scene->wall[i].velocity) > 0)
-            return false;
-    return true;
-}
-
-// Openings, a bed, bodies, forces, tension and closed air hold or bring energy that the history does not tell: no sum
-// then. Of water and grains together the sum is known where nothing is driven from outside, of water beside walls that
-// move through the work done on it.
-static result_energy energy_known(const silt_scene *scene) {
-    const silt_fluid_def *fluid = &scene->fluid;
-    result_energy known = {0};
-    const bool closed = fluid->n_inlet == 0 && fluid->n_outlet == 0 && !scene->bed.on && fluid->force.kind == 0 &&
-                        fluid->surface_tension == 0 && fluid->air_pressure == 0 && scene->period[0] == scene->period[1];
-    if (!closed)
-        return known;
-    const bool alone = walls_rest(scene) && scene->n_body == 0;
-    // of bodies that hit water the history has no energy
-    for (int i = 0; i < scene->n_body; i++)
-        if (scene->body[i].motion == MOTION_FREE)
-            return known;
-    known.water = fluid->on;
-    known.grains = scene->grains.on && alone;
-    known.worked = fluid->on && !known.grains;
-    return known;
-}
-
-static bool energy_counts(const result_energy *known, int i) {
-    return i < 3 ? known->water : i == 3 ? known->worked : known->grains;
-}
-
-static double energy_sum(const result_energy *known, const char *row) {
-    double sum = 0;
-    for (int i = 0; i < 6; i++)
-        if (energy_counts(known, i))
-            sum += (i == 3 ? -1 : 1) * result_cell(row, known->column[i]);
-    return sum;
-}
-
-// gauges have gaps, and wall units are known under water only
-static bool *columns_finite(const silt_scene *scene, const char *header, int *n) {
-    *n = 1;
-    for (const char *c = header; *c; c++)
-        *n += *c == ',';
-    bool *finite = silt_alloc((size_t)*n, sizeof *finite);
-    memset(finite, true, (size_t)*n * sizeof *finite);
-    const int n_gauge = silt_gauges_count(scene);
-    for (int i = 0; i < n_gauge + 2; i++) {
-        char name[64];
-        if (i < n_gauge)
-            silt_gauges_name(scene, i, name);
-        else
-            snprintf(name, sizeof name, i == n_gauge ? "y_plus" : "bed_y_plus");
-        const int column = silt_history_find(header, name);
-        if (column >= 0)
-            finite[column] = false;
-    }
-    return finite;
-}
-
-static void row_finite(const bool *finite, int n, const char *header, const char *row, result_history *h) {
-    const char *name = header;
-    for (int c = 0; c < n && row; c++) {
-        char *end;
-        const double x = strtod(row, &end);
-        if (finite[c] && (end == row || !isfinite(x))) {
-            snprintf(h->bad, sizeof h->bad, "%.*s", (int)strcspn(name, ",\n"), name);
-            return;
-        }
-        row = (row = strchr(row, ',')) ? row + 1 : NULL;
-        name = (name = strchr(name, ',')) ? name + 1 : "";
-    }
-}
-
-static void history_read(const silt_scene *scene, const char *out, result_history *h) {
-    static const char *const name[] = {"kinetic_energy", "potential_energy",     "owed_energy",
-                                       "external_work",  "grain_kinetic_energy", "grain_potential_energy"};
-    char *path = silt_text("%s/history.csv", out), *line = NULL, *header = NULL;
-    size_t capacity = 0, room = 0;
-    int n = 0;
-    bool *finite = NULL;
-    *h = (result_history){.excess = NAN, .scale = NAN};
-    FILE *from = fopen(path, "r");
-    if (!from || getline(&header, &room, from) <= 0)
-        goto done;
-    finite = columns_finite(scene, header, &n);
-    result_energy known = energy_known(scene);
-    for (int i = 0; i < 6; i++)
-        known.column[i] = silt_history_find(header, name[i]);
-    const int time = silt_history_find(header, "time");
-    const int volume = silt_history_find(header, "volume_error"), owed = silt_history_find(header, "volume_owed");
-    const int held = silt_history_find(header, "fluid_volume"), inflow = silt_history_find(header, "inflow_mass");
-    double first = 0, moved[6] = {0}, start[6] = {0}, most = 0, base = 0;
-    ssize_t length;
-    while ((length = getline(&line, &capacity, from)) > 0 && line[length - 1] == '\n') {
-        if (!*h->bad) {
-            row_finite(finite, n, header, line, h);
-            h->bad_time = result_cell(line, time);
-        }
-        const double sum = energy_sum(&known, line);
-        for (int i = 0; i < 6; i++) {
-            const double e = !energy_counts(&known, i) ? 0 : result_cell(line, known.column[i]);
-            if (h->rows == 0)
-                start[i] = e;
-            moved[i] = silt_max(moved[i], fabs(e - (i == 1 || i == 5 ? start[i] : 0)));
-        }
-        if (h->rows++ == 0) {
-            first = sum;
-            base = result_cell(line, held);
-        }
-        const double in = result_cell(line, inflow) / scene->fluid.density;
-        if (held >= 0 && base + in > 0)
-            h->mass = silt_max(h->mass, fabs(result_cell(line, volume) + result_cell(line, owed) / (base + in)));
-        most = silt_max(most, sum - first);
-    }
-    if (known.water || known.grains) {
-        h->excess = most;
-        for (int i = 0; i < 6; i++)
-            h->scale = (i ? h->scale : 0) + moved[i];
-    }
-done:
-    if (from)
-        fclose(from);
-    free(finite);
-    free(header);
-    free(line);
-    free(path);
-}
-
-// J, what the water at the start would give up if all of it sank to the foot of where it stands
-static double still_energy(const silt_scene *scene) {
-    const double g = silt_length(3, scene->gravity);
-    const int up = silt_scene_up(scene), n = scene->dimension == 3 ? 3 : 2;
-    double energy = 0;
-    for (int i = 0; i < scene->fluid.n_region; i++) {
-        double lo[3] = {0}, hi[3] = {0};
-        silt_region_bounds(&scene->fluid.region[i], lo, hi);
-        energy += 0.5 * scene->fluid.density * g * silt_region_area(&scene->fluid.region[i]) *
-                  (hi[up < n ? up : 1] - lo[up < n ? up : 1]);
-    }
-    return energy;
-}
+#define RESULT_BEYOND "beyond its bounds: " // what a run says of its ledgers at its end
 
 // a number of the last frame that is none; @return false: all are
 static bool frame_bad(const char *out, char text[64]) {
@@ -243,35 +77,35 @@ static double result_number(struct fy_document *summary, const char *key) {
 // @return true: the run is wrong, and text says in what; whole: it went to its end
 static bool judge(const study *s, const silt_scene *scene, const char *out, struct fy_document *summary, bool whole,
                   const char *warned, study_row *row, char *text, size_t size) {
-    result_history h;
+    static const char *const column[] = {"volume_error", "mass_error", "energy_excess"};
+    const double allowed[] = {s->bounds.volume, s->bounds.mass, s->bounds.energy};
+    silt_bounds b;
     char where[64] = "";
-    history_read(scene, out, &h);
-    const double volume = result_number(summary, "/worst_volume_error"),
-                 sediment = result_number(summary, "/worst_sediment_error");
-    const double scale = h.scale + (scene->fluid.on ? still_energy(scene) : 0), excess = scale > 0 ? h.excess / scale
-                                                                                         : h.excess > 0 ? HUGE_VAL
-                                                                                                        : h.excess;
-    study_row_add(row, "volume_error", "%.3g", volume);
-    study_row_add(row, "mass_error", "%.3g", h.mass);
+    const bool rows = silt_bounds_measure(scene, out, &b);
+    const double sediment = result_number(summary, "/worst_sediment_error");
+    for (silt_bound_kind k = 0; k < BOUND_COUNT; k++)
+        study_row_add(row, column[k], isnan(b.of[k].worst) ? "" : "%.3g", b.of[k].worst);
     study_row_add(row, "sediment_error", "%.3g", sediment);
-    study_row_add(row, "energy_excess", isnan(excess) ? "" : "%.3g", excess);
-    if (*h.bad)
-        snprintf(text, size, "no number in column %s at t = %g s", h.bad, h.bad_time);
+    if (!rows && whole)
+        snprintf(text, size, "history.csv has no rows");
+    else if (*b.bad)
+        snprintf(text, size, "no number in column %s at t = %g s", b.bad, b.bad_time);
     else if (frame_bad(out, where))
         snprintf(text, size, "no number in %s", where);
-    else if (!whole)
-        return false;
-    else if (!(h.mass <= s->bounds.mass) && !strstr(warned, "water's volume is off"))
-        snprintf(text, size, "mass error %.3g, allowed %g", h.mass, s->bounds.mass);
-    else if (!(fabs(volume) <= s->bounds.volume) && !strstr(warned, "water's volume is off"))
-        snprintf(text, size, "volume error %.3g, allowed %g", volume, s->bounds.volume);
-    else if (!(fabs(sediment) <= s->bounds.sediment))
+    else if (whole && !(fabs(sediment) <= s->bounds.sediment))
         snprintf(text, size, "sediment error %.3g, allowed %g", sediment, s->bounds.sediment);
-    else if (excess > s->bounds.energy && !*warned)
-        snprintf(text, size, "energy %.3g above the start and the work from outside, allowed %g", excess,
-                 s->bounds.energy);
-    else
+    else {
+        // of what the run itself says that it is beyond its bounds there is no more to say
+        for (silt_bound_kind k = 0; k < BOUND_COUNT && whole; k++) {
+            char told[32];
+            snprintf(told, sizeof told, "bounds.%s allows", silt_bound_word[k]);
+            if (b.of[k].worst > allowed[k] && !strstr(warned, told)) {
+                snprintf(text, size, "%s %.3g, allowed %g", column[k], b.of[k].worst, allowed[k]);
+                return true;
+            }
+        }
         return false;
+    }
     return true;
 }
 
@@ -335,9 +169,11 @@ void study_result(const study *s, const char *out, const char *log, const study_
         silt_scene *scene = NULL;
         silt_error err = {0};
         char *path = silt_text("%s/scene.yaml", out);
-        status = !whole ? RUN_FAILED : *warned ? RUN_WARNED : cut > 0 ? RUN_CUT : RUN_OK;
+        const char *beyond = strstr(warned, RESULT_BEYOND);
+        status = !whole ? RUN_FAILED : beyond ? RUN_BEYOND : *warned ? RUN_WARNED : cut > 0 ? RUN_CUT : RUN_OK;
+        const char *tell = beyond ? beyond : warned;
         if (whole && *warned)
-            snprintf(reason, sizeof reason, "%.*s", (int)strcspn(warned, "\n"), warned);
+            snprintf(reason, sizeof reason, "%.*s", (int)strcspn(tell, "\n"), tell);
         else if (whole)
             snprintf(reason, sizeof reason, cut > 0 ? "%.0f steps cut" : "", cut);
         if (silt_scene_read(path, 0, NULL, &scene, &err) != SILT_OK ||

@@ -5,7 +5,7 @@
 #include "study.h"
 
 const char *const study_status_word[RUN_STATUS_COUNT] = {
-    "ok", "cut-and-recovered", "warned", "refused", "failed", "unfinished", "hung", "crashed", "wrong"};
+    "ok", "cut-and-recovered", "warned", "beyond-bounds", "refused", "failed", "unfinished", "hung", "crashed", "wrong"};
 
 void study_row_add(study_row *row, const char *name, const char *format, ...) {
     va_list list;

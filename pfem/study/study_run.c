@@ -249,7 +249,7 @@ static silt_status search_at(job_search *search, double x, double *above, silt_e
     const silt_status status = job_run(search->s, search->def, search->out, search->k, value, name, &row, err);
     if (status == SILT_OK) {
         char *column = silt_text("%s_value", seek->check);
-        *above = study_row_status(&row) <= RUN_WARNED ? study_row_number(&row, column) - seek->value : NAN;
+        *above = study_row_status(&row) <= RUN_BEYOND ? study_row_number(&row, column) - seek->value : NAN;
         free(column);
     }
     study_row_clear(&row);

@@ -19,7 +19,7 @@ static int compare_sides(const void *a, const void *b) {
 static double volume_under(const silt_surface *s, int t) {
     const double *a = s->point[s->triangle[t][0]], *b = s->point[s->triangle[t][1]], *c = s->point[s->triangle[t][2]];
     double n[3];
-    wall_cross(b, c, n);
+    silt_cross(b, c, n);
     return wall_dot(a, n) / 6;
 }
 

@@ -79,7 +79,7 @@ static void solid_integrate(silt_solid *s) {
         for (int k = 0; k < 3; k++)
             for (int d = 0; d < 3; d++)
                 sum[d] += c[k][d] -= origin[d];
-        wall_cross(c[1], c[2], n);
+        silt_cross(c[1], c[2], n);
         const double det = wall_dot(c[0], n);
         volume += det / 6;
         for (int i = 0; i < 3; i++) {
@@ -120,7 +120,7 @@ static void solid_normals(silt_solid *s) {
                 v[d] = c[(k + 2) % 3][d] - c[k][d];
             }
             if (k == 0) {
-                wall_cross(u, v, n);
+                silt_cross(u, v, n);
                 const double length = silt_length(3, n);
                 for (int d = 0; d < 3; d++)
                     n[d] /= length > 0 ? length : 1;
@@ -320,11 +320,11 @@ static bool line_meets(const double c[3][3], const double x[3], const double u[3
         g[d] = c[2][d] - c[0][d];
         w[d] = x[d] - c[0][d];
     }
-    wall_cross(u, g, p);
+    silt_cross(u, g, p);
     const double det = wall_dot(e, p), size = silt_length(3, e) * silt_length(3, g) * silt_length(3, u);
     if (fabs(det) <= 1e-10 * size)
         return false;
-    wall_cross(w, e, q);
+    silt_cross(w, e, q);
     const double a = wall_dot(w, p) / det, b = wall_dot(u, q) / det;
     *t = wall_dot(g, q) / det;
     return a > 1e-9 && b > 1e-9 && a + b < 1 - 1e-9;

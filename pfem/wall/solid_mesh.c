@@ -23,6 +23,7 @@ typedef struct shell {
     const silt_solid *fine;
     int *fine_patch;   // owned, per face of fine
     uint8_t *round;    // owned, per patch: 1 where it is not plane
+    int *first;        // owned, per patch: one of its faces, whose normal is that of a plane patch
     uint8_t *wanted;   // owned, scratch, per face of fine
     int wanted_patch;
     int n_line;
@@ -68,6 +69,9 @@ static void shell_patches(shell *s) {
     }
     free(stack);
     s->round = silt_alloc((size_t)n_patch + 1, 1);
+    s->first = silt_alloc((size_t)n_patch + 1, sizeof *s->first);
+    for (int f = fine->n_face - 1; f >= 0; f--)
+        s->first[s->fine_patch[f]] = f;
     s->line = silt_alloc(3 * (size_t)fine->n_face + 1, sizeof *s->line);
     for (int f = 0; f < fine->n_face; f++)
         for (int k = 0; k < 3; k++) {
@@ -185,18 +189,24 @@ static bool shell_forward(const int *face, int a, int b) {
 
 static void face_normal(const double *a, const double *b, const double *c, double n[3]) {
     const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    wall_cross(u, v, n);
+    silt_cross(u, v, n);
 }
 
+// the normal that faces of a plane patch keep, else NULL: a face that has shrunk to nothing has none of its own to keep it from folding over
+static const double *shell_plane(const shell *s, int patch) { return s->round[patch] ? NULL : s->fine->normal[s->first[patch]]; }
+
 // the cosine between a face's normal and what it is with point i at `to`; -1 where it would have no area
-static double shell_turned(const shell *s, const int *face, int i, const double *to) {
+static double shell_turned(const shell *s, int f, int i, const double *to) {
     double before[3], after[3];
-    const double *c[3] = {s->x[face[0]], s->x[face[1]], s->x[face[2]]};
+    const int *face = s->face[f];
+    const double *plane = shell_plane(s, s->patch[f]), *c[3] = {s->x[face[0]], s->x[face[1]], s->x[face[2]]};
     face_normal(c[0], c[1], c[2], before);
     for (int k = 0; k < 3; k++)
         c[k] = face[k] == i ? to : c[k];
     face_normal(c[0], c[1], c[2], after);
     const double p = silt_length(3, before), q = silt_length(3, after);
+    if (plane && !(wall_dot(plane, after) > 0))
+        return -1;
     return q < 1e-3 * silt_square(s->size) && q < 0.5 * p ? -1 : p > 1e-6 * silt_square(s->size) ? wall_dot(before, after) / (p * q) : 1;
 }
 
@@ -337,7 +347,7 @@ static bool shell_bears(const shell *s, int i, int other, const double *x) {
         const int *face = s->face[s->ring[k]];
         if (other >= 0 && shell_has(face, other))
             continue;
-        if (!(shell_turned(s, face, i, x) >= mesh_turn))
+        if (!(shell_turned(s, s->ring[k], i, x) >= mesh_turn))
             return false;
         for (int c = 0; c < 3 && other >= 0; c++) {
             const double d[3] = {s->x[face[c]][0] - x[0], s->x[face[c]][1] - x[1], s->x[face[c]][2] - x[2]};
@@ -401,7 +411,7 @@ static double shell_angle(const shell *s, int at, int a, int b) {
         u[d] = s->x[a][d] - s->x[at][d];
         v[d] = s->x[b][d] - s->x[at][d];
     }
-    wall_cross(u, v, n);
+    silt_cross(u, v, n);
     return atan2(silt_length(3, n), wall_dot(u, v));
 }
 
@@ -426,7 +436,8 @@ static int shell_turn(shell *s) {
         face_normal(s->x[b], s->x[a], s->x[d], before[1]);
         face_normal(s->x[d], s->x[b], s->x[c], after[0]);
         face_normal(s->x[d], s->x[c], s->x[a], after[1]);
-        bool sound = !there;
+        const double *plane = shell_plane(s, s->patch[e.face[0]]);
+        bool sound = !there && (!plane || (wall_dot(plane, after[0]) > 0 && wall_dot(plane, after[1]) > 0));
         for (int p = 0; p < 2; p++)
             for (int q = 0; q < 2; q++)
                 sound &= wall_dot(before[p], after[q]) >= 0 && silt_length(3, after[q]) > 1e-6 * silt_square(s->size);
@@ -549,7 +560,7 @@ static double shell_volume(const shell *s, const double (*way)[3], double t) {
         for (int k = 0; k < 3; k++)
             for (int d = 0; d < 3; d++)
                 c[k][d] = s->x[s->face[f][k]][d] - s->fine->centroid[d] + t * way[s->face[f][k]][d];
-        wall_cross(c[1], c[2], n);
+        silt_cross(c[1], c[2], n);
         volume += wall_dot(c[0], n) / 6;
     }
     return volume;
@@ -603,6 +614,7 @@ static void shell_hand_over(const shell *s, silt_solid *mesh) {
 static void shell_clear(shell *s) {
     free(s->fine_patch);
     free(s->round);
+    free(s->first);
     free(s->wanted);
     free(s->line);
     free(s->x);

@@ -450,7 +450,7 @@ static void surface_mend(silt_surface *s) {
             u[d] = s->point[c[1]][d] - s->point[c[0]][d];
             v[d] = s->point[c[2]][d] - s->point[c[0]][d];
         }
-        wall_cross(u, v, n);
+        silt_cross(u, v, n);
         longest = silt_max(wall_dot(u, u), wall_dot(v, v));
         if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0] || !(sqrt(wall_dot(n, n)) > 1e-9 * longest))
             continue;

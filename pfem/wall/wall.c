@@ -86,7 +86,7 @@ static void triangle_set(silt_walls *walls, int e, const double *a, const double
         u[d] = b[d] - a[d];
         v[d] = c[d] - a[d];
     }
-    wall_cross(u, v, n);
+    silt_cross(u, v, n);
     const double length = sqrt(wall_dot(n, n));
     for (int d = 0; d < 3; d++)
         walls->normal[e][d] = n[d] / length;
@@ -225,10 +225,10 @@ static double water_angle(const silt_walls *walls, int e, int k, int f, int edge
         double along[3];
         for (int d = 0; d < 3; d++)
             along[d] = walls->corner[e][(k + 1) % 3][d] - walls->corner[e][k][d];
-        wall_cross(walls->normal[e], along, into_e);
+        silt_cross(walls->normal[e], along, into_e);
         for (int d = 0; d < 3; d++)
             along[d] = walls->corner[f][(edge_f + 1) % 3][d] - walls->corner[f][edge_f][d];
-        wall_cross(walls->normal[f], along, into_f);
+        silt_cross(walls->normal[f], along, into_f);
     } else
         for (int d = 0; d < 3; d++) {
             into_e[d] = wall_corner(walls, e, 1 - k, room[0])[d] - wall_corner(walls, e, k, room[1])[d];
@@ -323,7 +323,7 @@ static void elements_group(silt_walls *walls) {
                 r[k][d] = at[d] - origin[d];
             obstacle[piece[e]] &= wall_joined(walls, e, k) >= 0;
         }
-        wall_cross(r[0], r[1], c);
+        silt_cross(r[0], r[1], c);
         volume[piece[e]] += dim == 3 ? wall_dot(c, r[2]) : -c[2];
     }
     walls->index->closed = silt_alloc((size_t)n + 1, 1);
@@ -350,7 +350,7 @@ static void vertex_normals(silt_walls *walls) {
                 u[d] = walls->corner[e][(k + 1) % 3][d] - walls->corner[e][k][d];
                 v[d] = walls->corner[e][(k + 2) % 3][d] - walls->corner[e][k][d];
             }
-            wall_cross(u, v, c);
+            silt_cross(u, v, c);
             const double angle = atan2(sqrt(wall_dot(c, c)), wall_dot(u, v));
             for (int d = 0; d < 3; d++)
                 index->vertex_normal[index->vertex[e][k]][d] += angle * walls->normal[e][d];
@@ -599,7 +599,7 @@ static silt_hold hold_by(const silt_walls *walls, int n, const int element[3], c
     if (n == wall_dim(walls))
         return HOLD_ALL;
     if (n == 2) {
-        wall_cross(normal[0], normal[1], vector);
+        silt_cross(normal[0], normal[1], vector);
         const double length = sqrt(wall_dot(vector, vector));
         for (int d = 0; d < 3 && length > 0; d++)
             vector[d] /= length;
@@ -721,7 +721,7 @@ void silt_wall_normals_take(silt_wall_normals *normals, const silt_walls *walls,
                     side[c - 1][d] -= mesh->period[d] * floor(side[c - 1][d] / mesh->period[d] + 0.5);
             }
         if (dim == 3)
-            wall_cross(side[1], side[0], area);
+            silt_cross(side[1], side[0], area);
         else {
             area[0] = -side[0][1];
             area[1] = side[0][0];

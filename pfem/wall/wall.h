@@ -53,11 +53,6 @@ struct silt_wall_index {
 };
 
 static inline double wall_dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-static inline void wall_cross(const double *a, const double *b, double *c) {
-    c[0] = a[1] * b[2] - a[2] * b[1];
-    c[1] = a[2] * b[0] - a[0] * b[2];
-    c[2] = a[0] * b[1] - a[1] * b[0];
-}
 static inline int wall_dim(const silt_walls *walls) { return walls->dim == 3 ? 3 : 2; }
 
 // wall_index.c ----------------------------------------------------------------------------------------

@@ -129,8 +129,8 @@ static void node_bend(const silt_walls *walls, contact_node *p, int e, int edge,
         for (int d = 0; d < 3; d++)
             along[d] /= length;
     }
-    wall_cross(along, walls->normal[e], out);
-    wall_cross(along, walls->normal[f], into);
+    silt_cross(along, walls->normal[e], out);
+    silt_cross(along, walls->normal[f], into);
     // edge x normal points out of e, and into f when seen with the edge of e
     material_velocity(walls, walls->wall[e], p->x, wall);
     double way[3], speed[3];

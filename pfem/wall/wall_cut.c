@@ -61,7 +61,7 @@ static double corner_area(const double *a, const double *b, const double *c) {
         u[d] = b[d] - a[d];
         v[d] = c[d] - a[d];
     }
-    wall_cross(u, v, n);
+    silt_cross(u, v, n);
     return 0.5 * sqrt(wall_dot(n, n));
 }
 
@@ -78,7 +78,7 @@ static void cut_triangle(piece_list *list, const silt_opening *o, const wall_pie
         const double *p = o->corner + 3 * c, *q = o->corner + 3 * ((c + 1) % o->n_corner);
         const double edge[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
         double in[3];
-        wall_cross(o->normal, edge, in);
+        silt_cross(o->normal, edge, in);
         const double length = sqrt(wall_dot(in, in));
         for (int d = 0; d < 3; d++)
             in[d] /= length;

@@ -53,7 +53,7 @@ void wall_inside(const silt_walls *walls, int e, const double x[3], double in[3]
             edge[d] = b[d] - a[d];
             to[d] = x[d] - a[d];
         }
-        wall_cross(walls->normal[e], edge, in_plane);
+        silt_cross(walls->normal[e], edge, in_plane);
         in[k] = wall_dot(to, in_plane) / sqrt(wall_dot(edge, edge));
     }
 }
