@@ -23,7 +23,7 @@ fi
 while read -r file; do
     [ -f "$file" ] || continue
     case $file in
-    pfem/*.[ch] | pfem/*.cpp | dem-coupling/*.[ch] | include/*.h)
+    pfem/*.[ch] | pfem/*.cpp | dem-coupling/*.[ch] | include/*.h | tests/*.[ch])
         lines=$(wc -l <"$file")
         [ "$lines" -le 800 ] || breach "$file has $lines lines, at most 800"
         ;;

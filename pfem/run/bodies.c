@@ -301,36 +301,31 @@ static silt_impedance impedance_begin(const silt_run *run) {
     return z;
 }
 
-/** room for the solves of an impedance */
+/** modes that are solved, of one impedance */
 typedef struct silt_mode_room {
-    int n_mode, *row;  // owned: modes that are solved, and their rows
-    double **w, **p;   // owned, of each mode (impedance.c)
-    double *motion, *force, *rate; // owned
+    int n_mode, *row;  // owned, the rows
+    silt_mode *mode;   // owned
+    double *motion;    // owned
 } silt_mode_room;
 
 static void room_forget(silt_mode_room *room) {
-    for (int m = 0; m < room->n_mode; m++) {
-        free(room->w[m]);
-        free(room->p[m]);
-    }
+    for (int m = 0; m < room->n_mode; m++)
+        silt_mode_clear(&room->mode[m]);
     room->n_mode = 0;
 }
 
 // One solve: what the mode has with those before it, the work of its forces on their motions, is a row and a column.
 static silt_status impedance_column(silt_run *run, const silt_step *step, silt_impedance *z, silt_mode_room *room, int row, silt_error *err) {
-    const int n = run->fluid.n_node, D = run->fluid.dim, m = room->n_mode;
     const double per_acceleration = run->fluid.theta * run->dt;
+    silt_mode *mode = &room->mode[room->n_mode];
     if (!mode_motion(run, z->body[row / ROW], row % ROW, room->motion))
         return SILT_OK;
-    room->row[m] = row;
-    room->w[m] = silt_alloc((size_t)(D * n) + 1, sizeof(double));
-    room->p[m] = silt_alloc((size_t)n + 1, sizeof(double));
-    room->n_mode++;
-    SILT_TRY(silt_fluid_mode(&run->fluid, step, room->motion, room->w[m], room->p[m], err));
-    silt_fluid_mode_answer(&run->fluid, step, room->w[m], room->p[m], room->force, room->rate);
-    for (int o = 0; o <= m; o++) {
-        const double inertia = per_acceleration * (silt_dot(D * n, room->w[o], room->force) + silt_dot(n, room->p[o], room->rate));
-        z->water[room->row[o] * z->size + row] = z->water[row * z->size + room->row[o]] = inertia;
+    room->row[room->n_mode++] = row;
+    SILT_TRY(silt_fluid_mode(&run->fluid, step, room->motion, 0, mode, err));
+    for (int m = 0; m < room->n_mode; m++) {
+        const int other = room->row[m];
+        z->water[other * z->size + row] = per_acceleration * silt_mode_work(&run->fluid, &room->mode[m], mode);
+        z->water[row * z->size + other] = per_acceleration * silt_mode_work(&run->fluid, mode, &room->mode[m]);
     }
     return SILT_OK;
 }
@@ -405,16 +400,12 @@ static silt_status impedance_kept(silt_run *run, const silt_step *step, silt_imp
 static silt_status impedance_solve(silt_run *run, const silt_step *step, silt_impedance *z, silt_error *err) {
     const int D = silt_nodes_dim(&run->nodes);
     const size_t n = (size_t)(D * run->nodes.count) + 1, m = (size_t)z->size + 1;
-    silt_mode_room room = {.row = silt_alloc(m, sizeof(int)), .w = silt_alloc(m, sizeof(double *)), .p = silt_alloc(m, sizeof(double *)),
-                           .motion = silt_alloc(n, sizeof(double)), .force = silt_alloc(n, sizeof(double)), .rate = silt_alloc(n, sizeof(double))};
+    silt_mode_room room = {.row = silt_alloc(m, sizeof(int)), .mode = silt_alloc(m, sizeof(silt_mode)), .motion = silt_alloc(n, sizeof(double))};
     const silt_status status = (D == 3 && z->n > 1 ? impedance_kept : impedance_whole)(run, step, z, &room, err);
     room_forget(&room);
     free(room.row);
-    free(room.w);
-    free(room.p);
+    free(room.mode);
     free(room.motion);
-    free(room.force);
-    free(room.rate);
     return status;
 }
 
@@ -502,6 +493,16 @@ static silt_status impedance_sane(const silt_run *run, const silt_impedance *z, 
                              f[0], f[1], f[2], f[3], f[4], f[5], scene->body[z->body[k]].name, body->x[0], body->x[1], way / scene->fluid.size);
     }
     return SILT_OK;
+}
+
+silt_status silt_run_bodies_inertia(silt_run *run, const silt_step *step, int *size, double **inertia, silt_error *err) {
+    silt_impedance z = impedance_begin(run);
+    const silt_status status = impedance_solve(run, step, &z, err);
+    *size = z.size;
+    *inertia = z.water;
+    z.water = NULL;
+    impedance_clear(&z);
+    return status;
 }
 
 // B and R of the step from the force on bodies that go on as they do

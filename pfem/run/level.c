@@ -61,7 +61,7 @@ void silt_run_levels(silt_run *run) {
 void silt_run_levels_thin(silt_run *run) {
     silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
-    for (int i = 0; i < nodes->count; i++) {
+    for (int i = 0; i < nodes->count && silt_levels_any(run->scene); i++) {
         if (nodes->kind[i] != NODE_OPEN)
             continue;
         if (!run->mesh.wet[i]) {

@@ -118,7 +118,7 @@ static void water_restore(silt_run *run) {
     silt_stiff_forget(run->fluid.stiff);
 }
 
-static silt_step water_see(silt_run *run) {
+silt_step silt_run_see(silt_run *run) {
     const silt_scene *scene = run->scene;
     silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
                       .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
@@ -161,7 +161,7 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
         if (scene->n_body)
             silt_run_bodies_coast(run);
-        const silt_step step = water_see(run);
+        const silt_step step = silt_run_see(run);
         silt_clock_to(CLOCK_assemble);
         status = silt_fluid_step(&run->fluid, &step, err);
         silt_clock_to(CLOCK_rest);
@@ -277,6 +277,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     const double wanted = silt_run_pace(run);
     if (step_sane(run, wanted, err) != SILT_OK) {
         run->whole = false; // not worth a checkpoint
+        run->back = -1;
         return SILT_FAILED;
     }
     int64_t n = step_choose(run, wanted);
@@ -309,15 +310,18 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         });
         const bool moved = status == SILT_OK;
         if (moved && scene->fluid.on && silt_run_bodies_free(run)) {
-            const silt_step step = water_see(run);
+            const silt_step step = silt_run_see(run);
             silt_clock_to(CLOCK_assemble);
             status = silt_run_bodies_answer(run, &step, err);
             silt_clock_to(CLOCK_rest);
         }
         if (status == SILT_OK)
             break;
-        if (!grains_again(run, &n, attempt, err))
+        if (!grains_again(run, &n, attempt, err)) {
+            // the step may be a good one for another worker, with the same bits where the set-ups are the same
+            run->back = moved ? run->back : run->back_set_up;
             return moved ? water_gave_up(run, attempt + 1, n <= 1, err) : silt_run_grains_failed(run, status, err);
+        }
     }
     if (scene->fluid.on && silt_run_bodies_free(run) && silt_seep_on(scene))
         silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
@@ -385,8 +389,9 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
     silt_view view;
     silt_run_view(run, &view);
     silt_gauges_read(run->gauges, &view, run->gauge);
-    SILT_TRY(silt_history_row(run->history, &view, run->gauge, err));
-    if (run->tick == 0 && run->offset == 0)
+    if (!run->again)
+        SILT_TRY(silt_history_row(run->history, &view, run->gauge, err));
+    if (run->tick == 0 && run->offset == 0 && !run->again)
         SILT_TRY(silt_frame_write(run->out, (int)run->frame, &view, err));
     for (int k = 0; k < PHASE_COUNT; k++)
         run->summary.phase[k] += run->phase[k];
@@ -396,6 +401,8 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
         run->summary.most_iterations = run->fluid.iterations;
     run->summary.steps++;
     run->whole = true;
+    run->back = run->step;
+    run->back_set_up = silt_run_set_up_due(run, run->dt) ? run->step : run->back_set_up;
     double seconds[CLOCK_COUNT];
     silt_clock_read(seconds);
     run->output_seconds = seconds[CLOCK_output];

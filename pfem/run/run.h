@@ -83,6 +83,8 @@ struct silt_run {
     int64_t saved_step; // of the newest checkpoint, -1: none yet
     double saved_time;
     bool whole;         // the state is that of the end of a step, nothing of the next one has been done to it
+    int64_t back, back_set_up; // step whose end a run that fails goes back to, -1: none is worth it; the last one with set_up_due
+    bool again;         // goes over steps that are in the folder already: writes neither rows nor frames, warns of nothing
     int lock;           // descriptor that keeps other runs out of the folder, -1: none
 
     silt_ledger ledger;
@@ -129,6 +131,8 @@ struct silt_run {
 silt_status silt_run_open(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock, silt_error *err);
 
 // run.c, besides silt_run_advance: clocks are there to be read until its next call --------------------
+/** the step as the water sees it */
+silt_step silt_run_see(silt_run *run);
 /** what output sees of the run */
 void silt_run_view(silt_run *run, silt_view *view);
 /** porosity, ledger and pressure of a state, for row and frame */
@@ -139,7 +143,7 @@ void silt_run_free(silt_run *run);
 
 // grains.c --------------------------------------------------------------------------------------------
 /** true where the discrete elements are set up anew: checkpoints are taken at such places only */
-bool silt_run_set_up_due(const silt_run *run);
+bool silt_run_set_up_due(const silt_run *run, double last);
 /** Grains and bodies over n of their steps, under the water's forces. again: the step was cut. */
 silt_status silt_run_grains(silt_run *run, int n, bool again, silt_error *err);
 /** what the discrete elements say of their failure, with the step and the bodies. @return status */
@@ -157,6 +161,9 @@ void silt_run_bodies_coast(silt_run *run);
 /** After it, before the discrete elements move: the water's force on bodies and its inertia around them, for the substeps to come.
  * SILT_FAILED: the force cannot be. */
 silt_status silt_run_bodies_load(silt_run *run, const silt_step *step, silt_error *err);
+/** The water's inertia at the free bodies after its step, as the solves give it: kg, kg m, kg m2, size by size, six rows a body. *inertia is
+ * owned by the caller, also of an error. */
+silt_status silt_run_bodies_inertia(silt_run *run, const silt_step *step, int *size, double **inertia, silt_error *err);
 /** After the discrete elements have moved: the water's step again, with that motion of the bodies; what its force on them differs
  * from what they received is carried to the next step. */
 silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_error *err);

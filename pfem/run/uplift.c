@@ -6,7 +6,7 @@
 #include "solid.h"
 #include "wall.h"
 
-#define UPLIFT_SHUT 0.02 // of the local size: a mouth that is narrower lets no air through
+#define UPLIFT_SHUT 0.1  // of the local size: a mouth that is narrower lets no air through
 #define SLAVE (-3)       // in `place`: a node that has been listed
 #define UPLIFT_GAP 0.5   // of it: what is nearer to something solid has no air between
 
@@ -433,6 +433,10 @@ static void mouths_shut(silt_uplift *u, silt_run *run) {
         }
         any |= u->closed[f];
     }
+    // a wide film that air comes to is air
+    for (int k = 0; k < m->n_node; k++)
+        if (u->open[group_of(u, m->node[k])] && m->rim[k] == FILM_WET && !near_solid(run, m->node[k], UPLIFT_SHUT))
+            m->rim[k] = FILM_AIR;
     if (any)
         pieces_seal(u, run);
     for (int f = 0; f < mesh->n_facet && any; f++) {
