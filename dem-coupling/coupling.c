@@ -481,7 +481,8 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     if (n > 0 && c->responds)
         silt_coupling_keep_old(c);
     SILT_RESERVE(c->force, c->force_capacity, 3 * c->n_last);
-    memset(c->force, 0, 3 * (size_t)c->n_last * sizeof *c->force);
+    if (c->n_last > 0) // else there may be no array
+        memset(c->force, 0, 3 * (size_t)c->n_last * sizeof *c->force);
     for (int i = 0, k = 0; i < c->n_grain; i++) {
         coupling_grain *g = &c->grain[i];
         memcpy(g->old_x, g->x, sizeof g->old_x);

@@ -344,6 +344,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     // material motion; all nodes, so that the old cells hold what continuity gave them
     const double before = silt_mesh_volume(mesh, nodes->x);
     let_go(run);
+    const double squeezed = silt_uplift_give(run->uplift, run);
     silt_uplift_open(run->uplift, run);
     for (int i = 0; i < n; i++)
         if (mesh->wet[i])
@@ -359,7 +360,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     silt_run_levels(run);
     run->ledger.volume_solved += run->fluid.solved_volume;
     run->ledger.volume_given += run->fluid.given_back;
-    run->ledger.volume_moved += moved - before - run->fluid.solved_volume - run->fluid.given_back;
+    run->ledger.volume_moved += moved - before - run->fluid.solved_volume - run->fluid.given_back - squeezed;
     if (scene->fluid.air_pressure > 0)
         silt_pockets_advance(&run->pockets, scene, mesh, run->x_old, nodes->x);
     potential_add(run, 1);

@@ -403,6 +403,7 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
     silt_view view;
     silt_run_view(run, &view);
     silt_gauges_read(run->gauges, &view, run->gauge);
+    run->back = -1; // where rows cannot be written checkpoints cannot either
     if (!run->again)
         SILT_TRY(silt_history_row(run->history, &view, run->gauge, err));
     if (run->tick == 0 && run->offset == 0 && !run->again)
