@@ -7,6 +7,7 @@ static const double parcel_usual = 0.75;                   // radius that the ti
 static const double room_overlap = 0.01;                   // of the radius
 static const double heap_porosity = 0.4;                   // of what fills the regions, when it has settled
 static const double period_share = 3.2;                    // slab thickness over the largest sphere's diameter
+static const double period_pieces = 2000;                  // walls are cut into pieces as long as the slab is thick: about as many at most
 
 static void coupling_close(silt_coupling **coupling);
 
@@ -32,6 +33,15 @@ double silt_coupling_burden(const silt_coupling *c, const coupling_grain *g) {
         return 1.0;
     double sphere = 4.0 / 3.0 * M_PI * crumb * crumb * crumb * g->mass / g->solid;
     return silt_max(1.0, sphere / (g->mass * c->width));
+}
+
+// Thickness of the slab in the plane. Its walls are strips of triangles no longer than it: of a small grain in a large tank there would be
+// millions of them, and as many bins. Nothing moves across it, so that it may be thicker.
+static double coupling_period(const silt_walls *walls, double largest) {
+    double length = 0.0;
+    for (int i = 0; i < walls->count; i++)
+        length += hypot(walls->to[i][0] - walls->from[i][0], walls->to[i][1] - walls->from[i][1]);
+    return silt_max(period_share * 2.0 * largest, length / period_pieces);
 }
 
 // widths, radii, time step and everything else that the worker is told once
@@ -120,7 +130,7 @@ static void coupling_measure(silt_coupling *c, const silt_coupling_def *def) {
         .way_hi = {def->way_hi[0], def->way_hi[1], def->way_hi[2]},
         .periodic = periodic,
         .across = grains->across,
-        .period = period_share * 2.0 * largest,
+        .period = space ? 0.0 : coupling_period(c->walls, largest),
         .gravity = {scene->gravity[0], scene->gravity[1], scene->gravity[2]},
         .youngs_modulus = contact->youngs_modulus,
         .wall_modulus = contact->wall_modulus,
@@ -584,6 +594,7 @@ static silt_status coupling_create(silt_coupling **coupling, const silt_coupling
     silt_coupling *c = *coupling = silt_alloc(1, sizeof *c);
     c->scene = def->scene;
     c->walls = def->walls;
+    c->box_margin = def->margin;
     c->dim = def->scene->dimension == 3 ? 3 : 2;
     c->next_id = c->sent_id = 1;
     c->view = silt_alloc(1, sizeof *c->view);
@@ -686,7 +697,10 @@ static void coupling_close(silt_coupling **coupling) {
 
 static double coupling_step(const silt_coupling *c) { return c->step; }
 
-static silt_body_state *coupling_bodies(const silt_coupling *c) { return c->bodies; }
+static silt_body_state *coupling_bodies(const silt_coupling *c) {
+    silt_coupling_bodies_gone(c);
+    return c->bodies;
+}
 
 static int coupling_process(const silt_coupling *c) { return silt_dem_process(c->dem); }
 

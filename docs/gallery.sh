@@ -1,6 +1,6 @@
 #!/bin/sh
-# The reports and pictures of docs/report.md: runs the three cases where FOLDER does not have them yet (about ten minutes on one
-# thread), makes FOLDER/CASE.html and the pictures beside this file. Needs chromium, ffmpeg and libjs-three.
+# The reports and pictures of docs/report.md: runs the four cases where FOLDER does not have them yet (about fifteen minutes on
+# one thread), makes FOLDER/CASE.html and the pictures beside this file. Needs chromium, ffmpeg and libjs-three.
 # usage: docs/gallery.sh SILT FOLDER
 set -eu
 [ $# -eq 2 ] || { sed -n '4s/^# //p' "$0" >&2; exit 2; }
@@ -66,10 +66,12 @@ run() {
 run dam-break dam-break/scene-gate.yaml
 run temple temple/scene.yaml
 run earth-dam earth-dam/scene.yaml
+run ten-tetrapods tetrapods/scene.yaml
 
 page dam-break 1.16 2900
 page temple 7 1900
 page earth-dam 4 2500 --slice y=0.4
+page ten-tetrapods 0.75 1900
 
 picture dam-break a 15
 picture dam-break b 58
@@ -82,4 +84,8 @@ picture earth-dam a 8
 picture earth-dam b 16 --without water
 picture earth-dam c 16 --slice y=0.4
 small earth-dam.png "$work/a.png" "$work/b.png" "$work/c.png"
+picture ten-tetrapods a 14
+picture ten-tetrapods b 18
+picture ten-tetrapods c 16 --slice y=0.15
+small ten-tetrapods.png "$work/a.png" "$work/b.png" "$work/c.png"
 ls -l "$docs"/*.png

@@ -53,10 +53,11 @@ done >"$work/figures"
             sub(/_$/, "", what)
             d = told[2] - told[3]; d = d < 0 ? -d : d
             size = told[3] < 0 ? -told[3] : told[3]
-            # of the same thing told many times the worst
+            # of the same thing told many times the worst over what it may be
             key = run ":" what
-            if (!(key in worst) || d > worst[key]) {
-                worst[key] = d
+            share = told[4] > 0 ? d / told[4] : d
+            if (!(key in worst) || share > worst[key]) {
+                worst[key] = share
                 row[key] = key "\t" told[2] "\t" told[3] "\t" (size > 0 ? d / size : d) "\t" told[4] "\t" (d <= told[4] ? "pass" : "FAIL") "\t" d
             }
         } else if (split(line, cell, /[ ]+/) >= 6 && (cell[6] == "pass" || cell[6] == "FAIL"))

@@ -199,7 +199,7 @@ static void test_turning(void **state) {
                   100 * (pressure_at(&b, centre) / 375 - 1));
     near(axis(&b, 0), 1, 0.005, "width of a turning drop");
     near(axis(&b, 1), 1, 0.005, "its height");
-    near(integral(&b, one, NULL), area, 0.001 * area, "its area");
+    near(integral(&b, one, NULL), area, 0.001 * area, "area of a turning drop");
     near(integral(&b, spin_of, NULL), spin, 0.005 * spin, "its spin");
     near(pressure_at(&b, centre), 375, 4, "its pressure");
     bench_end(&b);

@@ -55,6 +55,11 @@ static void test_wrong(void **state) {
     }
     closedir(dir);
     assert_true(n_file >= 200);
+    // the hint is of the kind that was asked for
+    wrong(WRONG "check_gauge_column.yaml", 0, NULL, 1, "found 'max_speed', which is a column of history.csv and no gauge, allowed column: max_speed");
+    static const char *const near_column[] = {"checks.0.gauge=max_sped"}, *const near_gauge[] = {"checks.0.gauge=h"};
+    wrong(WRONG "check_gauge_column.yaml", 1, near_column, 1, "found 'max_sped', allowed a gauge of this scene\n");
+    wrong(WRONG "check_gauge_column.yaml", 1, near_gauge, 1, "allowed a gauge of this scene; did you mean 'g'?");
 }
 
 static void test_broken_files(void **state) {

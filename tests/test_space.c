@@ -596,6 +596,40 @@ static void test_slice(void **state) {
     assert_int_equal(silt_frame_cut(folder, -1, &err), SILT_OK);
 }
 
+// bodies are drawn with the scene's own surface, where history.csv has them: a brick turned by a quarter about z
+static void test_draw_form(void **state) {
+    (void)state;
+    silt_body_def brick = {.name = "brick", .shape = SHAPE_BOX, .scale = 4, .depth = 2, .height = 1, .axis = {0, 0, 1}, .density = 1};
+    const silt_scene scene = {.dimension = 3, .n_body = 1, .body = &brick};
+    const double c = sqrt(0.5);
+    silt_draw_forms *forms = NULL;
+    double *point = NULL, lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    FILE *to = fopen(place("history.csv"), "w");
+    fprintf(to, "step,time,brick_x,brick_y,brick_z,brick_qw,brick_qx,brick_qy,brick_qz\n0,0,0,0,0,1,0,0,0\n7,0.5,10,20,30,%.17g,0,0,%.17g\n", c, c);
+    fclose(to);
+    silt_draw_forms_make(&forms, &scene, folder);
+    const silt_solid *solid = silt_draw_form(forms, &scene, 0, 0.5, &point);
+    assert_non_null(solid);
+    for (int i = 0; i < solid->n_point; i++)
+        for (int d = 0; d < 3; d++) {
+            lo[d] = silt_min(lo[d], point[3 * i + d]);
+            hi[d] = silt_max(hi[d], point[3 * i + d]);
+        }
+    static const double half[3] = {1, 2, 0.5};
+    for (int d = 0; d < 3; d++) {
+        near(lo[d], 10 * (d + 1) - half[d], 1e-12);
+        near(hi[d], 10 * (d + 1) + half[d], 1e-12);
+    }
+    near(solid->volume, 8, 1e-12);
+    free(point);
+    // at a time that history.csv does not have the frame's surface is all there is
+    point = NULL;
+    assert_null(silt_draw_form(forms, &scene, 0, 0.4, &point));
+    assert_null(point);
+    silt_draw_forms_free(&forms);
+    assert_null(forms);
+}
+
 // the colour of a pixel that shows a point of the world
 static unsigned pixel(const silt_draw_canvas *c, int x, int y) {
     const uint8_t *row = cairo_image_surface_get_data(c->surface) + y * cairo_image_surface_get_stride(c->surface);
@@ -637,7 +671,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_gauges),   cmocka_unit_test(test_wall_forces), cmocka_unit_test(test_frames),
         cmocka_unit_test(test_periodic), cmocka_unit_test(test_profiles),    cmocka_unit_test(test_slice),
-        cmocka_unit_test(test_draw),     cmocka_unit_test(test_grain_profile),
+        cmocka_unit_test(test_draw), cmocka_unit_test(test_draw_form),     cmocka_unit_test(test_grain_profile),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

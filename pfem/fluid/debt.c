@@ -2,6 +2,7 @@
 #include "fluid.h"
 
 #define DEBT_CAP 0.3 // largest share of a node's volume that its debt may ask for
+#define HELD_BESIDE 9   // held all round, beside one that is not
 #define DEBT_SPRAY 0.1 // of h^3: a node of the free surface that has less is spray
 
 static double gravity_size(const silt_scene *scene) {
@@ -143,6 +144,13 @@ void silt_mobile_find(silt_fluid *f, const silt_mesh *mesh, double *p) {
         if (!f->mobile[i])
             f->rate[i] = 0;
     }
+    // at films such nodes keep it too: what a body squeezes there must go on, by the smoothing, or a full tank could not answer
+    for (int i = 0; f->film && i < f->n_node; i++)
+        for (int k = mesh->neighbour_start[i]; f->mobile[i] == 0 && k < mesh->neighbour_start[i + 1]; k++)
+            if (f->hold[mesh->neighbour[k]] == HOLD_ALL && f->mobile[mesh->neighbour[k]] == 1)
+                f->mobile[i] = HELD_BESIDE;
+    for (int i = 0; f->film && i < f->n_node; i++)
+        f->mobile[i] = f->mobile[i] == HELD_BESIDE ? 1 : f->mobile[i];
     // films and crumbs of water on bed, walls or bodies, with a node or two that are free: too few to keep a volume; they
     // run as drops do, at no pressure, and what they gain is owed
     const int *piece = pieces(f, mesh);

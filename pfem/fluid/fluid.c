@@ -9,6 +9,8 @@
 #define FLUID_AGAIN 10      // iterations of a step that is solved again, at least: to cut it now costs LIGGGHTS' step too
 #define FLUID_REFRESH 2     // how often a step refreshes what converges slowly and is small: the projected pressure gradient (0.9 an
                             // iteration) and the excess of the mass (0.75 in the highest modes)
+#define FLUID_FILM 8        // the same where bodies squeeze films, which goes on through the smoothing: after two looks a block's heave on the floor
+                            // meets 0.8 of its inertia, after eight 0.99
 #define FLUID_INNER 1e4     // accuracy of a pressure increment over that of the step, at least: refreshes are counted, so what an
                             // increment lacks does not all come back
 #define FLUID_ROUGH 10      // times that in space, before a refresh, which leaves a third of the residual whatever the increment was: 9
@@ -17,7 +19,7 @@
 
 void silt_fluid_clear(silt_fluid *f) {
     double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->start, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
-                       f->level_force, f->bed_force, f->ride, f->level_brake, f->mass, f->volume,
+                       f->blow, f->level_force, f->bed_force, f->ride, f->level_brake, f->mass, f->volume,
                        f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
                        f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->pressure_new, f->v_start, f->v_first, f->debt_first, f->normal, f->given, f->cg[0],
                        f->cg[1]};
@@ -184,6 +186,12 @@ static void find_excess(silt_fluid *f, const silt_step *s, double stiff, const d
                 a[D * i + d] -= b[d];
         }
     }
+    for (int k = 0; f->film && k < f->film->n_slave; k++) { // these go with a body
+        double *own = a + D * f->film->slave[k];
+        for (int d = 0; d < D; d++)
+            own[d] = (f->w[D * f->film->slave[k] + d] - v[D * f->film->slave[k] + d]) / theta_dt;
+        silt_film_free_part(f->film, k, D, own);
+    }
     silt_assemble_mass_excess(f, s->mesh, s->scene->fluid.density, a, f->excess);
 }
 
@@ -314,9 +322,7 @@ void silt_fluid_correct(silt_fluid *f, const silt_step *s, const double *q, doub
     }
 }
 
-// increment = -matrix^-1 residual, in 3-D to `tolerance`, or to what is worth having where the step is solved far; seeps: it is a
-// pressure, which the bed answers, not an impulse or the way that debts are paid
-static silt_status pressure_increment(silt_fluid *f, const silt_step *s, bool seeps, double tolerance, silt_error *err) {
+silt_status silt_fluid_increment(silt_fluid *f, const silt_step *s, bool seeps, double tolerance, silt_error *err) {
     silt_status status;
     SILT_PARALLEL(f->n_node)
     for (int j = 0; j < f->n_node; j++)
@@ -327,45 +333,6 @@ static silt_status pressure_increment(silt_fluid *f, const silt_step *s, bool se
     else
         SILT_CLOCKED(solve, status = silt_pressure_solve(f->pressure, f, f->residual, tolerance, f->increment, err));
     return status;
-}
-
-static double kinetic_energy(const silt_fluid *f, const silt_step *s, const double *v) {
-    double sum = 0;
-    for (int i = 0; i < f->n_node; i++)
-        for (int d = 0; d < f->dim && s->mesh->wet[i]; d++)
-            sum += 0.5 * f->mass[i] * silt_square(v[f->dim * i + d]);
-    return sum;
-}
-
-// nodes of bodies start with the bodies' velocity, and not with that of the step
-static bool own_start(const silt_step *s, int i) {
-    return s->body_velocity && s->nodes->kind[i] == NODE_BODY;
-}
-
-// The trapezoidal rule keeps whatever divergence the first velocity has and turns its sign from step to step: remeshing and
-// the mesh's motion put some in, so it is taken out first, on the mesh where the nodes are (projected Runge-Kutta method for
-// index-2 systems: Ascher and Petzold, SIAM J. Numer. Anal. 28, 1991).
-static silt_status project_start(silt_fluid *f, const silt_step *s, const double *p, silt_error *err) {
-    const int D = f->dim;
-    double *v = s->nodes->v;
-    silt_assemble_geometry(f, s, 0);
-    for (int i = 0; i < f->n_node; i++)
-        if (s->mesh->wet[i] && !own_start(s, i))
-            silt_hold_turn(f, i, v + D * i);
-    silt_assemble_projection(f, s->mesh, p);
-    const double before = kinetic_energy(f, s, v);
-    // once: what is left is the smoothing's, and more of it makes the pressure rougher
-    silt_assemble_continuity(f, s->mesh, s->drag, NULL, v, p);
-    SILT_TRY(pressure_increment(f, s, false, 1e-2, err));
-    silt_fluid_correct(f, s, f->increment, v);
-    f->projected = before - kinetic_energy(f, s, v);
-    for (int i = 0; i < f->n_node; i++)
-        if (s->mesh->wet[i]) {
-            memcpy(f->w + D * i, v + D * i, (size_t)D * sizeof(double));
-            if (own_start(s, i))
-                silt_hold_replace(f, i, f->given + D * i, f->w + D * i);
-        }
-    return SILT_OK;
 }
 
 // Debts are paid by moving the nodes, not by pushing the water: a velocity without momentum, shift = P G q / inertia with
@@ -391,7 +358,7 @@ static silt_status shift_find(silt_fluid *f, const silt_step *s, silt_error *err
         }
         for (int i = 0; i < f->n_node; i++)
             f->residual[i] = f->mobile[i] == 1 ? f->residual[i] - f->rate[i] : 0;
-        SILT_TRY(pressure_increment(f, s, false, D == 3 ? FLUID_PAID : 0.03, err));
+        SILT_TRY(silt_fluid_increment(f, s, false, D == 3 ? FLUID_PAID : 0.03, err));
         silt_fluid_correct(f, s, f->increment, f->shift);
     }
     return SILT_OK;
@@ -454,6 +421,10 @@ static void reactions(silt_fluid *f, const silt_step *s, const double *p) {
         out[k] += s->mesh->wet[k / D] ? f->bed_force[k] : 0;
     if (f->film)
         silt_film_press(f->film, D, p, out);
+    for (int k = 0; f->blow && k < D * f->n_node; k++) {
+        out[k] += f->blow[k] / dt;
+        f->worked += f->blow[k] * f->w[k];
+    }
     // the law of the wall brakes what is free
     for (int k = 0; k < f->law.n_point; k++) {
         const int i = f->law.point[k].node;
@@ -557,7 +528,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, b
                 // a first pressure, nought, does not balance the smoothing of the potential
                 double *potential = f->potential;
                 f->potential = first ? NULL : potential;
-                status = project_start(f, s, p, err);
+                status = silt_fluid_start(f, s, p, err);
                 f->potential = potential;
                 SILT_TRY(status);
             }
@@ -574,7 +545,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, b
         const double stiff = stiffness(f, s);
         const bool squeezed = s->pockets && silt_pockets_stiff(s->pockets, D, 0.5 * s->dt, f->mass) > 0.1;
         momentum_right(f, s, p, f->force);
-        const bool refresh = (first && stiff <= FLUID_STIFF) || f->iterations < FLUID_REFRESH;
+        const bool refresh = (first && stiff <= FLUID_STIFF) || f->iterations < (f->film ? FLUID_FILM : FLUID_REFRESH);
         if (stiff > 0)
             SILT_CLOCKED(momentum, silt_momentum_look(f, s->mesh, f->w));
         if (refresh)
@@ -635,7 +606,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, b
         if (whole)
             SILT_TRY(correct_whole(f, s, err));
         else
-            SILT_TRY(pressure_increment(f, s, true, refresh && !first && D == 3 ? FLUID_ROUGH * 0.01 : 0.01, err));
+            SILT_TRY(silt_fluid_increment(f, s, true, refresh && !first && D == 3 ? FLUID_ROUGH * 0.01 : 0.01, err));
         if (!whole)
             silt_fluid_correct(f, s, f->increment, f->w);
         if (!direct && (split || stiff > FLUID_STIFF)) {
@@ -682,7 +653,7 @@ static silt_status fluid_accept(silt_fluid *f, const silt_step *s, silt_status s
         for (int d = 0; d < D; d++)
             nodes->v[D * i + d] += (f->w[D * i + d] - nodes->v[D * i + d]) / f->theta;
         // on a bent wall the velocity turns on: contact takes it along the wall
-        if (!own_start(s, i) && !(f->wall_normals.n_row && f->wall_normals.row[i] >= 0 && f->hold[i] == HOLD_NORMAL))
+        if (!silt_fluid_own_start(s, i) && !(f->wall_normals.n_row && f->wall_normals.row[i] >= 0 && f->hold[i] == HOLD_NORMAL))
             silt_hold_impose(f, i, nodes->v + D * i);
     }
     return SILT_OK;
@@ -703,6 +674,10 @@ silt_status silt_fluid_step(silt_fluid *f, const silt_step *s, silt_error *err) 
     f->iterations = f->momentum_iterations = f->pressure_iterations = 0;
     f->projected = 0;
     memset(f->impulse, 0, sizeof f->impulse);
+    if (s->scene->n_body) {
+        SILT_RESERVE(f->blow, f->blow_capacity, D * f->n_node + 1);
+        memset(f->blow, 0, (size_t)(D * f->n_node) * sizeof *f->blow);
+    }
     silt_hold_nodes(f, s);
     // kept apart until the step is accepted
     double *p = f->pressure_new, *v = f->v_start;

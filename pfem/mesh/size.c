@@ -8,7 +8,8 @@
  * so that h is the rule's size inside its distance, grows (or falls) at g around it, is fluid.size far away, the finer of two
  * rules wins, and |h(x) - h(y)| <= g |x - y| everywhere.
  * Regions are taken by their exact distance. Surface, bed, bodies and wet walls are the nodes that lie on them: each node gets
- * the nearest of them handed on along the mesh's edges, no farther than the rule reaches. */
+ * the nearest of them handed on along the mesh's edges, no farther than the rule reaches. From dry parts of bodies, which have no edges, it
+ * goes through the air: the water that a body falls towards is refined before it strikes. */
 
 #define SIZE_NODE_KIND (NEAR_SURFACE + 1)
 
@@ -28,7 +29,7 @@ struct silt_size {
     double base, growth;
     double reach[SIZE_NODE_KIND]; // m, beyond which a kind has no say; 0: no rule names it
     double (*lo)[3], (*hi)[3];    // owned, bounds of every rule's region
-    size_places places[SIZE_NODE_KIND];
+    size_places places[SIZE_NODE_KIND], dry; // dry: of bodies
     bool updated;
     // work of an update
     double *square[SIZE_NODE_KIND]; // owned, m2, of every node to the nearest place
@@ -106,6 +107,9 @@ void silt_size_free(silt_size **size) {
         free(s->places[k].item);
         free(s->square[k]);
     }
+    free(s->dry.x);
+    free(s->dry.start);
+    free(s->dry.item);
     free(s->source);
     free(s->from);
     free(s->front);
@@ -351,6 +355,21 @@ static void size_spread(silt_size *s, const silt_nodes *nodes, const silt_mesh *
     }
 }
 
+// straight from nodes of bodies that no cell holds
+static void size_through_air(silt_size *s, const silt_nodes *nodes, const silt_mesh *mesh) {
+    double *square = s->square[NEAR_BODIES];
+    s->dry.n = 0;
+    for (int i = 0; i < nodes->count; i++)
+        if (nodes->kind[i] == NODE_BODY && (i >= mesh->n_node || !mesh->wet[i]))
+            places_add(&s->dry, nodes->x + s->dim * i, s->dim);
+    if (!s->dry.n)
+        return;
+    places_sort(&s->dry, s->dim);
+    for (int i = 0; i < nodes->count; i++)
+        if (square[i] > 0)
+            square[i] = silt_min(square[i], silt_square(places_distance(s, &s->dry, nodes->x + s->dim * i, s->reach[NEAR_BODIES])));
+}
+
 void silt_size_update(silt_size *size, silt_nodes *nodes, const silt_mesh *mesh) {
     if (!size)
         return;
@@ -367,6 +386,8 @@ void silt_size_update(silt_size *size, silt_nodes *nodes, const silt_mesh *mesh)
             continue;
         SILT_RESERVE(size->square[k], size->square_capacity[k], n + 1);
         size_spread(size, nodes, mesh, k);
+        if (k == NEAR_BODIES)
+            size_through_air(size, nodes, mesh);
         if (k == NEAR_WALLS)
             continue;
         size_places *p = &size->places[k];

@@ -5,7 +5,9 @@
 #include <errno.h>
 #include <unistd.h>
 
-// even steps of lightness from dark blue to yellow (the palette known as viridis)
+// even steps of lightness: still water deep blue, fast water pale
+static const unsigned draw_water[] = {0x123f78, 0x1b5996, 0x2673b2, 0x338fc2, 0x4dabc8, 0x79c6c0, 0xaadaad, 0xd8e79a, 0xf6ee8c};
+// from dark blue to yellow (the palette known as viridis)
 static const unsigned draw_map[] = {0x440154, 0x482878, 0x3e4989, 0x31688e, 0x26828e,
                                     0x1f9e89, 0x35b779, 0x6ece58, 0xb5de2b, 0xfde725};
 // untouched sand to worn
@@ -15,10 +17,10 @@ static const unsigned draw_turn[] = {0x16345f, 0x2f6da8, 0x86b7d8, 0xf4f4f2, 0xe
 #define DRAW_MAP(table) table, sizeof(table) / sizeof *(table)
 
 static const silt_draw_field draw_fields[] = {
-    {"speed", "speed, m/s", "PointData/velocity", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
+    {"speed", "speed, m/s", "PointData/velocity", NULL, MADE_LENGTH, DRAW_MAP(draw_water)},
     {"pressure", "pressure, Pa", "PointData/pressure", "PointData/pressure", MADE_LENGTH, DRAW_MAP(draw_map)},
     {"porosity", "porosity", "PointData/porosity", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
-    {"elevation", "elevation, m", "PointData/pressure", NULL, MADE_ELEVATION, DRAW_MAP(draw_map)},
+    {"elevation", "elevation, m", "PointData/pressure", NULL, MADE_ELEVATION, DRAW_MAP(draw_water)},
     {"vorticity", "vorticity, 1/s", "PointData/velocity", NULL, MADE_VORTICITY, DRAW_MAP(draw_turn)},
     {"mesh", NULL, NULL, NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
     {"bed", "frictional work, J/m³", NULL, "PointData/work", MADE_LENGTH, DRAW_MAP(draw_worn)},
@@ -132,6 +134,8 @@ silt_status silt_draw_open(silt_draw_canvas *c, silt_draw_book *book, const char
     // the run had them: a surface file that is gone since is no reason not to draw
     if (silt_draw_shows(c, DRAW_WALLS) && silt_walls_create(&book->walls, book->scene, NULL) == SILT_OK)
         c->walls = &book->walls;
+    silt_draw_forms_make(&book->forms, book->scene, out);
+    c->forms = book->forms;
     if (c->scene->dimension == 3 && !c->slice)
         silt_draw_space_survey(c, book->entry, book->n_frame);
     else
@@ -141,6 +145,7 @@ silt_status silt_draw_open(silt_draw_canvas *c, silt_draw_book *book, const char
 
 void silt_draw_close(silt_draw_book *book) {
     silt_walls_clear(&book->walls);
+    silt_draw_forms_free(&book->forms);
     silt_scene_free(&book->scene);
     free(book->entry);
     memset(book, 0, sizeof *book);

@@ -8,6 +8,7 @@
 #include <cairo.h>
 
 #include "output.h"
+#include "solid.h"
 
 // pixels: the picture's largest width, the plot's largest and smallest height, the margins around the plot
 enum { PICTURE_WIDTH = 1600, PLOT_HEIGHT = 1000, PLOT_LOW = 220, PLOT_NARROW = 420 };
@@ -37,10 +38,13 @@ typedef struct silt_draw_field {
 /** what a picture may show or leave out */
 typedef enum { DRAW_WATER = 1, DRAW_BED = 2, DRAW_GRAINS = 4, DRAW_BODIES = 8, DRAW_WALLS = 16 } silt_draw_part;
 
+typedef struct silt_draw_forms silt_draw_forms; // draw_form.c
+
 /** fixed for all pictures of a run, then the picture being drawn */
 typedef struct silt_draw_canvas {
     const char *out;
     const silt_scene *scene;
+    const silt_draw_forms *forms; // of the bodies; NULL: as the frames have them
     silt_walls *walls; // of the scene, moved to the time of the picture; NULL: none
     unsigned without;  // silt_draw_part: what is left out
     const silt_draw_field *field;
@@ -62,6 +66,7 @@ typedef struct silt_draw_canvas {
 typedef struct silt_draw_book {
     silt_scene *scene;
     silt_walls walls;
+    silt_draw_forms *forms;
     silt_frame_entry *entry;
     int n_frame;
 } silt_draw_book;
@@ -72,6 +77,16 @@ void silt_draw_close(silt_draw_book *book);
 /** the picture of a frame, owned by the caller */
 cairo_surface_t *silt_draw_picture(silt_draw_canvas *c, const silt_frame_entry *entry);
 static inline bool silt_draw_shows(const silt_draw_canvas *c, silt_draw_part part) { return !(c->without & (unsigned)part); }
+
+// draw_form.c
+/** the surfaces of the scene's bodies in space; NULL where there are none */
+void silt_draw_forms_make(silt_draw_forms **forms, const silt_scene *scene, const char *out);
+void silt_draw_forms_free(silt_draw_forms **forms);
+/** Body's surface at a time of history.csv. *point: its points there, owned by the caller. @return NULL: not known */
+const silt_solid *silt_draw_form(const silt_draw_forms *forms, const silt_scene *scene, int body, double time, double **point);
+
+/** silt_draw_read of the bodies, in space with those surfaces where they are known */
+bool silt_draw_bodies(const silt_draw_canvas *c, const silt_frame_entry *entry, silt_grid *grid);
 
 // draw_film.c
 /** All frames as one moving picture. The file's ending says which kind: mp4, webm, webp, gif; made by ffmpeg, which must be

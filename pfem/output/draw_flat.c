@@ -291,9 +291,9 @@ static void draw_cut_bodies(silt_draw_canvas *c, const silt_grid *grid) {
     free(at);
 }
 
-static void draw_bodies(silt_draw_canvas *c, int number) {
+static void draw_bodies(silt_draw_canvas *c, const silt_frame_entry *entry) {
     silt_grid grid;
-    if (!silt_draw_read(c, &grid, "bodies", number, NULL))
+    if (!silt_draw_bodies(c, entry, &grid))
         return;
     if (c->slice)
         draw_cut_bodies(c, &grid);
@@ -379,7 +379,7 @@ void silt_draw_flat(silt_draw_canvas *c, const silt_frame_entry *entry) {
     draw_water(c, entry->number);
     draw_bed(c, entry->number);
     draw_grains(c, entry->number);
-    draw_bodies(c, entry->number);
+    draw_bodies(c, entry);
     draw_walls(c);
     cairo_restore(c->cr);
     draw_axes(c);

@@ -272,23 +272,44 @@ static void space_water(space *s, int number) {
     }
 }
 
-// faces of the bodies, lines where they bend: polygons are taken as fans
-static void space_bodies(space *s, int number) {
+// from a face to the mean of those around a corner: below this angle the surface is round there, above it has an edge (of a box 45)
+#define SPACE_ROUND 38
+
+// corners of the triangle of polygon i that ends at its corner k + 1: polygons are taken as fans
+static void space_fan(const silt_grid *grid, int i, int k, int node[3]) {
+    node[0] = grid->link[grid->offset[i]];
+    node[1] = grid->link[k];
+    node[2] = grid->link[k + 1];
+}
+
+// round where they are round
+static void space_bodies(space *s, const silt_frame_entry *entry) {
     const silt_draw_colour stone = silt_draw_hex(0xb9b4ac);
     silt_grid grid;
-    if (!silt_draw_read(s->c, &grid, "bodies", number, NULL))
+    if (!silt_draw_bodies(s->c, entry, &grid))
         return;
-    for (int i = 0; i < grid.n_cell; i++)
-        for (int k = grid.offset[i] + 1; k + 1 < grid.offset[i + 1]; k++) {
-            space_face face = {.x = {grid.x + 3 * grid.link[grid.offset[i]], grid.x + 3 * grid.link[k], grid.x + 3 * grid.link[k + 1]},
-                               .flat = stone, .plain = 0.5, .lit = 0.55};
-            space_normal(face.x[0], face.x[1], face.x[2], face.normal[0]);
-            space_unit(face.normal[0]);
-            memcpy(face.normal[1], face.normal[0], sizeof face.normal[0]);
-            memcpy(face.normal[2], face.normal[0], sizeof face.normal[0]);
-            if (space_dot(face.normal[0], s->eye) > 0)
+    double *smooth = silt_alloc(3 * (size_t)grid.n_point + 1, sizeof *smooth), normal[3], mean[3];
+    int node[3];
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < grid.n_cell; i++)
+            for (int k = grid.offset[i] + 1; k + 1 < grid.offset[i + 1]; k++) {
+                space_fan(&grid, i, k, node);
+                space_face face = {.x = {grid.x + 3 * node[0], grid.x + 3 * node[1], grid.x + 3 * node[2]}, .flat = stone, .plain = 0.5, .lit = 0.55};
+                space_normal(face.x[0], face.x[1], face.x[2], normal);
+                for (int a = 0; a < 3 && pass == 0; a++)
+                    for (int d = 0; d < 3; d++)
+                        smooth[3 * node[a] + d] += normal[d];
+                space_unit(normal);
+                if (pass == 0 || space_dot(normal, s->eye) <= 0)
+                    continue;
+                for (int a = 0; a < 3; a++) {
+                    memcpy(mean, smooth + 3 * node[a], sizeof mean);
+                    space_unit(mean);
+                    memcpy(face.normal[a], space_dot(mean, normal) > cos(SPACE_ROUND * M_PI / 180) ? mean : normal, sizeof mean);
+                }
                 space_fill(s, &face);
-        }
+            }
+    free(smooth);
     silt_grid_clear(&grid);
 }
 
@@ -412,7 +433,8 @@ static void space_axis(space *s, int axis, const double *corner, const double aw
         cairo_line_to(cr, p[0] + 6 * away[0], p[1] + 6 * away[1]);
         cairo_stroke(cr);
         silt_draw_number(text, v, step);
-        silt_draw_text(cr, p[0] + 12 * away[0], p[1] + 14 * away[1], align, 14, false, text);
+        if (axis != 1 || v > c->lo[axis] + 0.3 * step) // the number of the first axis' end stands there
+            silt_draw_text(cr, p[0] + 12 * away[0], p[1] + 14 * away[1], align, 14, false, text);
     }
     a[axis] = 0.5 * (c->lo[axis] + c->hi[axis]);
     space_pixel(s, a, p);
@@ -555,7 +577,7 @@ void silt_draw_space(silt_draw_canvas *c, const silt_frame_entry *entry) {
     if (c->walls && c->walls->corner)
         space_walls(&s, c->walls);
     space_bed(&s, entry->number);
-    space_bodies(&s, entry->number);
+    space_bodies(&s, entry);
     space_water(&s, entry->number);
     space_show(&s);
     space_scales(&s);

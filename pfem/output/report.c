@@ -33,6 +33,28 @@ static void report_row(FILE *to, const char *name, const char *format, ...) {
     fputs("</td></tr>\n", to);
 }
 
+// the ledgers against the scene's bounds; of a run that goes on, so far
+static void report_bounds(const silt_report_page *r) {
+    silt_bounds b;
+    if (!silt_bounds_measure(r->scene, r->out, &b))
+        return;
+    char energy[64] = "";
+    if (!isnan(b.of[BOUND_ENERGY].worst))
+        snprintf(energy, sizeof energy, "; energy gained %.2g %%", 100 * b.of[BOUND_ENERGY].worst);
+    if (r->scene->fluid.on)
+        report_row(r->to, "worst of the ledger", "volume off by %.2g %%, of which lost or gained %.2g %%%s", 100 * b.of[BOUND_VOLUME].worst,
+                   100 * b.of[BOUND_MASS].worst, energy);
+    for (silt_bound_kind k = 0; k < BOUND_COUNT; k++) {
+        char text[256];
+        double allowed;
+        if (!silt_bounds_broken(&b, r->scene, k, &allowed, text))
+            continue;
+        fputs("<tr><th class=\"fail\">beyond its bounds</th><td>", r->to);
+        silt_html_text(r->to, text);
+        fputs("</td></tr>\n", r->to);
+    }
+}
+
 // what ran, how it ended and on what, from summary.json; a run that goes on has none
 static void report_run(const silt_report_page *r, const silt_table *table, const silt_draw_book *book) {
     struct fy_document *summary = silt_summary_open(r->out);
@@ -61,11 +83,12 @@ static void report_run(const silt_report_page *r, const silt_table *table, const
     if (summary) {
         report_row(r->to, "took", "%.4g s of the clock, %.0f MB at the most", silt_summary_number(summary, "/seconds"),
                    silt_summary_number(summary, "/peak_memory_bytes") / 1e6);
-        report_row(r->to, "worst of the ledger", "volume %.2e, sediment %.2e, momentum %.2e", silt_summary_number(summary, "/worst_volume_error"),
-                   silt_summary_number(summary, "/worst_sediment_error"), silt_summary_number(summary, "/worst_momentum_error"));
+        report_row(r->to, "sediment, momentum", "not closed by %.2g, %.2g at the most", silt_summary_number(summary, "/worst_sediment_error"),
+                   silt_summary_number(summary, "/worst_momentum_error"));
     }
+    report_bounds(r);
     if (*processor)
-        report_row(r->to, "machine", "%s, %.0f processors, %.0f threads, %s", processor, silt_summary_number(summary, "/machine/processors"),
+        report_row(r->to, "machine", "%s, %.0f processors, threads used: %.0f, %s", processor, silt_summary_number(summary, "/machine/processors"),
                    silt_summary_number(summary, "/machine/threads"), silt_summary_text(summary, "/machine/system"));
     if (*silt_summary_text(summary, "/ended"))
         report_row(r->to, "ended", "%s", silt_summary_text(summary, "/ended"));

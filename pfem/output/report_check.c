@@ -174,8 +174,8 @@ void silt_report_checks(const silt_report_page *report) {
     int passed = 0;
     for (int i = 0; i < scene->n_check; i++)
         passed += result[i].pass;
-    fprintf(to, "<section id=\"checks\"><h2>Checks: %d of %d pass</h2>\n<table class=\"checks\"><tr><th>check</th><th>value</th>"
-                "<th>reference</th><th>error</th><th>tolerance</th><th></th><th>held against</th></tr>\n", passed, scene->n_check);
+    fprintf(to, "<section id=\"checks\"><h2>Checks: %d of %d pass</h2>\n<table class=\"checks\"><tr><th>check</th><th class=\"number\">value</th>"
+                "<th class=\"number\">reference</th><th class=\"number\">error</th><th class=\"number\">tolerance</th><th></th><th>held against</th></tr>\n", passed, scene->n_check);
     for (int i = 0; i < scene->n_check; i++) {
         const silt_check_result *r = &result[i];
         fputs("<tr><td>", to);

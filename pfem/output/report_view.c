@@ -217,11 +217,11 @@ static void view_grains(view *v, int number) {
 }
 
 // faces as fans of triangles; outlines in the plane are not convex: the page takes them apart itself
-static void view_bodies(view *v, int number) {
+static void view_bodies(view *v, const silt_frame_entry *entry) {
     const bool space = v->canvas->scene->dimension == 3;
     silt_grid grid;
     view_bytes b = {0};
-    if (!view_read(v, &grid, "bodies", number, NULL))
+    if (!silt_draw_bodies(v->canvas, entry, &grid))
         return;
     view_open(v, "bodies");
     view_points(v, &grid, false);
@@ -271,7 +271,7 @@ static void view_frame(view *v, const silt_frame_entry *entry) {
     view_water(v, entry->number);
     view_bed(v, entry->number);
     view_grains(v, entry->number);
-    view_bodies(v, entry->number);
+    view_bodies(v, entry);
     view_walls(v, entry->time);
     if (v->index)
         fputc('}', v->index);

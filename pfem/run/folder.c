@@ -110,6 +110,8 @@ char *silt_worker_find(const char *asked) {
 }
 
 void silt_run_warn(const silt_run *run, const char *format, ...) {
+    if (run->again)
+        return;
     char text[512], *path = silt_text("%s/run.log", run->out);
     va_list list;
     va_start(list, format);

@@ -1,11 +1,16 @@
 // grains and bodies in a step: the water's load on them, their substeps, and what is told when these fail
 #include "run.h"
 
-#define SET_UP_EVERY 16 // steps, between the discrete elements' set-ups
+#define SET_UP_EVERY 16  // steps, between the discrete elements' set-ups
+#define SET_UP_LONG 4096 // of their steps, in one of the run
 
 // The discrete elements are set up anew where a frame begins, and every sixteenth step: ten thousand grains cost 5 ms then, in
 // place of 5 ms a step. Checkpoints are taken at such places only, so that a run that goes on from one has the same set-ups.
-bool silt_run_set_up_due(const silt_run *run) { return run->tick == 0 || run->step % SET_UP_EVERY == 0; }
+// Grains without water make long steps, beside which a set-up is nothing.
+bool silt_run_set_up_due(const silt_run *run, double last) {
+    const bool dry = !run->scene->fluid.on && run->coupling && last > SET_UP_LONG * silt_coupling_dem.step(run->coupling);
+    return dry || run->tick == 0 || run->step % SET_UP_EVERY == 0;
+}
 
 silt_status silt_run_grains(silt_run *run, int n, bool again, silt_error *err) {
     silt_nodes moving = run->nodes; // with the velocity that the drag was solved with
@@ -16,7 +21,7 @@ silt_status silt_run_grains(silt_run *run, int n, bool again, silt_error *err) {
         silt_coupling_dem.walk(run->coupling, &run->nodes, &run->mesh, run->fluid.mu, run->dt, run->step);
     if (run->scene->grains.gusts > 0 && run->fluid.mu)
         silt_coupling_dem.gusts(run->coupling, &run->nodes, &run->mesh, run->fluid.mu, run->time + run->dt);
-    if (!again && !silt_run_set_up_due(run))
+    if (!again && !silt_run_set_up_due(run, run->dt_old))
         silt_coupling_dem.keep(run->coupling);
     SILT_TRY(silt_coupling_dem.start(run->coupling, n, err));
     return silt_coupling_dem.finish(run->coupling, err);

@@ -17,12 +17,13 @@ silt_status silt_run_checkpoint(silt_run *run, silt_error *err) {
     if (run->saved_step == run->step)
         return SILT_OK;
     // the history must reach the disk first: a checkpoint is never ahead of it
-    silt_status status = silt_history_sync(run->history, err);
+    silt_status status = run->again ? SILT_OK : silt_history_sync(run->history, err);
     char *path = silt_text("%s/checkpoint-%c.h5", run->out, 'a' + run->checkpoint_slot);
     if (status == SILT_OK)
         status = silt_run_save(run, path, err);
     free(path);
     run->whole = status == SILT_OK;
+    run->back = status == SILT_OK ? run->back : -1;
     if (status == SILT_OK) {
         run->checkpoint_slot = 1 - run->checkpoint_slot;
         run->saved_step = run->step;
@@ -31,24 +32,10 @@ silt_status silt_run_checkpoint(silt_run *run, silt_error *err) {
     return status;
 }
 
-// a run that fails tells where it can be taken up again; when only the next step failed, that is where it stands
-static void run_failed(silt_run *run, silt_error *err) {
-    silt_error late = {0};
-    if (run->whole)
-        silt_run_checkpoint(run, &late);
-    if (!err)
-        return;
-    const size_t used = strlen(err->text), room = sizeof err->text - used;
-    if (late.count)
-        snprintf(err->text + used, room, "\nno checkpoint of this state: %s", late.text);
-    else if (run->saved_step >= 0)
-        snprintf(err->text + used, room, "\nthe last checkpoint is of step %lld, t = %.9g s; go on from it with: silt resume %s",
-                 (long long)run->saved_step, run->saved_time, run->out);
-}
-
 static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_run_def *def, const char *out, int lock,
                              silt_error *err) {
-    *run = (silt_run){.scene = scene, .def = *def, .saved_step = -1, .lock = lock, .n_shown = -1};
+    *run = (silt_run){.scene = scene, .def = *def, .saved_step = -1, .back = -1, .back_set_up = -1, .lock = lock,
+                       .n_shown = -1};
     run->out = silt_text("%s", out);
     run->log = silt_text("%s/dem.log", out);
     run->trace = silt_text("%s/trace.csv", out);
@@ -66,6 +53,86 @@ static silt_status run_begin(silt_run *run, const silt_scene *scene, const silt_
     return SILT_OK;
 }
 
+// the state at t = 0
+static silt_status run_from_start(silt_run *run, silt_error *err) {
+    silt_view view;
+    SILT_TRY(silt_run_first(run, err));
+    SILT_TRY(silt_run_measure(run, err));
+    silt_run_view(run, &view);
+    return silt_gauges_create(&run->gauges, &view, err);
+}
+
+// the state of a checkpoint
+static silt_status run_from_checkpoint(silt_run *run, const char *path, silt_error *err) {
+    silt_store *store = NULL;
+    silt_status status = silt_store_open(&store, path, err);
+    if (status == SILT_OK)
+        status = silt_run_load(run, store, err);
+    if (status == SILT_OK)
+        silt_walls_move(&run->walls, run->scene, run->time, 0);
+    silt_store_close(&store);
+    return status;
+}
+
+static bool run_late(const silt_run *run) {
+    return run->scene->time.wall > 0 && silt_seconds() - run->started > run->scene->time.wall;
+}
+
+// A step that fails after grains, bodies or bed have gone on has changed the state before it. Steps have the same bits whenever they are
+// made: those since the last checkpoint are made once more, up to the last good state, which is saved.
+static silt_status run_go_back(silt_run *run, silt_error *err) {
+    silt_run *again = silt_alloc(1, sizeof *again);
+    char *old = silt_text("%s/checkpoint-%c.h5", run->out, 'b' - run->checkpoint_slot);
+    silt_status status = run_begin(again, run->scene, &run->def, run->out, -1, err);
+    again->again = true;
+    again->checkpoint_slot = run->checkpoint_slot;
+    free(again->log);
+    again->log = silt_text("/dev/null");
+    free(again->trace);
+    again->trace = NULL;
+    if (status == SILT_OK && run->saved_step >= 0)
+        status = run_from_checkpoint(again, old, err);
+    else if (status == SILT_OK) {
+        status = run_from_start(again, err);
+        if (status == SILT_OK)
+            status = silt_run_output(again, err);
+    }
+    free(old);
+    if (status == SILT_OK && !run->def.quiet)
+        fprintf(stderr, "\nstep %lld failed after it had changed its start: steps %lld to %lld are made again to save that\n", (long long)run->step + 1,
+                (long long)again->step + 1, (long long)run->back);
+    while (status == SILT_OK && again->step < run->back)
+        status = run_stop || run_late(run) ? silt_fail(err, SILT_STOPPED, "there is no time left") : silt_run_advance(again, err);
+    if (status == SILT_OK)
+        status = silt_history_sync(run->history, err);
+    if (status == SILT_OK)
+        status = silt_run_checkpoint(again, err);
+    if (status == SILT_OK) {
+        run->saved_step = again->step;
+        run->saved_time = again->time;
+    }
+    silt_run_free(again);
+    free(again);
+    return status;
+}
+
+// a run that fails tells where it can be taken up again; when only the next step failed, that is where it stands
+static void run_failed(silt_run *run, silt_error *err) {
+    silt_error late = {0};
+    if (run->whole)
+        silt_run_checkpoint(run, &late);
+    else if (run->back > run->saved_step)
+        run_go_back(run, &late);
+    if (!err)
+        return;
+    if (late.count)
+        snprintf(err->text + strlen(err->text), sizeof err->text - strlen(err->text), "\nno checkpoint of this state: %s", late.text);
+    if (run->saved_step >= 0)
+        snprintf(err->text + strlen(err->text), sizeof err->text - strlen(err->text),
+                 "\nthe last checkpoint is of step %lld, t = %.9g s; go on from it with: silt resume %s", (long long)run->saved_step, run->saved_time,
+                 run->out);
+}
+
 static double run_end(const silt_run *run) { return run->def.until > 0 ? run->def.until : run->scene->time.end; }
 
 bool silt_run_ended(const silt_run *run) {
@@ -75,8 +142,8 @@ bool silt_run_ended(const silt_run *run) {
 
 // what a signal or the wall's clock asks for, and the checkpoints that the scene asks for
 static silt_status run_keep(silt_run *run, int64_t frames_between, silt_error *err) {
-    const bool late = run->scene->time.wall > 0 && silt_seconds() - run->started > run->scene->time.wall;
-    if ((run_asked || late) && silt_run_set_up_due(run) && !silt_run_ended(run)) {
+    const bool late = run_late(run);
+    if ((run_asked || late) && silt_run_set_up_due(run, run->dt) && !silt_run_ended(run)) {
         run_asked = 0;
         SILT_TRY(silt_run_checkpoint(run, err));
         if (run_stop || late)
@@ -155,12 +222,8 @@ static void signals_catch(void) {
 
 // the state at t = 0 with its row and frame
 static silt_status run_start(silt_run *run, silt_error *err) {
-    silt_view view;
     SILT_TRY(silt_verify_copy(run->scene, run->out, err));
-    SILT_TRY(silt_run_first(run, err));
-    SILT_TRY(silt_run_measure(run, err));
-    silt_run_view(run, &view);
-    SILT_TRY(silt_gauges_create(&run->gauges, &view, err));
+    SILT_TRY(run_from_start(run, err));
     SILT_TRY(silt_history_create(&run->history, run->out, run->scene, err));
     return silt_run_output(run, err);
 }
@@ -229,15 +292,9 @@ static silt_status resume_load(silt_run *run, const silt_scene *scene, const sil
         const int k = step[1] > step[0];
         if (step[k] < 0)
             break;
-        silt_store *store = NULL;
         status = run_begin(run, scene, def, def->out, -1, &why[k]);
         if (status == SILT_OK)
-            status = silt_store_open(&store, path[k], &why[k]);
-        if (status == SILT_OK)
-            status = silt_run_load(run, store, &why[k]);
-        if (status == SILT_OK)
-            silt_walls_move(&run->walls, scene, run->time, 0);
-        silt_store_close(&store);
+            status = run_from_checkpoint(run, path[k], &why[k]);
         if (status != SILT_OK) {
             silt_run_free(run);
             step[k] = -1;
@@ -247,6 +304,7 @@ static silt_status resume_load(silt_run *run, const silt_scene *scene, const sil
         run->saved_step = run->step;
         run->saved_time = run->time;
         run->whole = true;
+        run->back = run->back_set_up = run->step;
         run->lock = lock;
         resume_log(run, path[k], path[1 - k], why[1 - k].text);
     }

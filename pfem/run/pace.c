@@ -3,6 +3,8 @@
 
 #define STEP_SPRAY  2 // times the root mean square of the water's speed
 #define STEP_APART  3 // shares of a cell that spray may cross, over those that it may go away from its neighbours
+#define STEP_DRY    2e7 // steps of spheres without water in one of the run, and steps at least
+#define STEP_DRY_LEAST 1000
 #define STEP_FLYING 4 // shares of a cell that drops in free flight, whose paths are exact, and spray may cross
 
 // time in which a wall that moves passes a cell of the water on it: a gate also that slides along the water
@@ -60,9 +62,15 @@ static double crossing_time(const silt_run *run) {
     const silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
     const double spray = spray_speed(run);
+    const silt_body_state *bodies = run->step == 0 && run->scene->n_body && run->coupling ? silt_coupling_dem.bodies(run->coupling) : NULL;
     double least = HUGE_VAL;
     for (int i = 0; i < nodes->count; i++) {
         double speed = silt_length(D, nodes->v + D * i);
+        if (nodes->kind[i] == NODE_BODY && bodies) { // its nodes have no velocity yet
+            double v[3] = {0};
+            silt_run_body_velocity(&bodies->body[nodes->owner[i]], nodes->x + D * i, D, v);
+            speed = silt_max(speed, silt_length(D, v));
+        }
         if (nodes->kind[i] == NODE_CORNER || nodes->kind[i] == NODE_BED || speed == 0)
             continue;
         const bool water = nodes->kind[i] == NODE_FLUID, wet = i < run->mesh.n_node && run->mesh.wet[i];
@@ -75,6 +83,15 @@ static double crossing_time(const silt_run *run) {
     return least;
 }
 
+// s, that grains without water may go on alone: some seconds of a processor, after which a signal is heard
+static double dry_time(const silt_run *run) {
+    const silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    double spheres = silt_coupling_dem.grains(run->coupling)->count;
+    for (int i = 0; i < bodies->count; i++)
+        spheres += bodies->body[i].n_sphere;
+    return silt_max(STEP_DRY_LEAST, floor(STEP_DRY / (100 + spheres))) * silt_coupling_dem.step(run->coupling);
+}
+
 // largest step that accuracy allows: courant number, cells that do not turn over, gravity, growth
 double silt_run_pace(const silt_run *run) {
     const silt_scene *scene = run->scene;
@@ -83,7 +100,7 @@ double silt_run_pace(const silt_run *run) {
     double dt = scene->time.step > 0 ? scene->time.step : HUGE_VAL;
     dt = silt_min(dt, scene->time.output);
     if (!scene->fluid.on)
-        return dt;
+        return run->coupling ? silt_min(dt, dry_time(run)) : dt;
     double least = crossing_time(run);
     // time in which a node falls through a cell
     for (int i = 0; i < nodes->count; i++) {

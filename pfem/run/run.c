@@ -118,7 +118,7 @@ static void water_restore(silt_run *run) {
     silt_stiff_forget(run->fluid.stiff);
 }
 
-static silt_step water_see(silt_run *run) {
+silt_step silt_run_see(silt_run *run) {
     const silt_scene *scene = run->scene;
     silt_step step = {.scene = scene, .walls = &run->walls, .mesh = &run->mesh, .drag = run->drag,
                       .pockets = scene->fluid.air_pressure > 0 ? &run->pockets : NULL,
@@ -161,7 +161,7 @@ static silt_status water_step(silt_run *run, int64_t *n, silt_error *err) {
         run->fluid.last_try = (attempt > 0 && attempt >= scene->time.retries) || (run->coupling && *n <= 1);
         if (scene->n_body)
             silt_run_bodies_coast(run);
-        const silt_step step = water_see(run);
+        const silt_step step = silt_run_see(run);
         silt_clock_to(CLOCK_assemble);
         status = silt_fluid_step(&run->fluid, &step, err);
         silt_clock_to(CLOCK_rest);
@@ -240,6 +240,18 @@ static void bed_resolved(silt_run *run) {
                        "too low; finer water at the bed, or bed.shear: log-law", run->bed.y_plus, BED_Y_PLUS);
 }
 
+// a body that has left: where, and what went with it
+static void bodies_gone(const silt_run *run) {
+    const silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    for (int b = 0; b < run->n_body_before; b++) {
+        const struct silt_body *body = &bodies->body[b];
+        if (body->gone && !run->body_before[b].gone)
+            silt_run_warn(run, "body '%s' has left at (%g, %g, %g) and is held there: %g kg, momentum (%g, %g, %g) kg m/s", run->scene->body[b].name,
+                          body->x[0], body->x[1], body->x[2], body->mass, body->mass * body->v[0], body->mass * body->v[1],
+                          body->mass * body->v[2]);
+    }
+}
+
 static void bed_step(silt_run *run) {
     const double dt = silt_max(run->dt - run->wear_ahead, 0);
     run->wear_ahead = silt_max(run->wear_ahead - run->dt, 0);
@@ -277,6 +289,7 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     const double wanted = silt_run_pace(run);
     if (step_sane(run, wanted, err) != SILT_OK) {
         run->whole = false; // not worth a checkpoint
+        run->back = -1;
         return SILT_FAILED;
     }
     int64_t n = step_choose(run, wanted);
@@ -309,15 +322,18 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         });
         const bool moved = status == SILT_OK;
         if (moved && scene->fluid.on && silt_run_bodies_free(run)) {
-            const silt_step step = water_see(run);
+            const silt_step step = silt_run_see(run);
             silt_clock_to(CLOCK_assemble);
             status = silt_run_bodies_answer(run, &step, err);
             silt_clock_to(CLOCK_rest);
         }
         if (status == SILT_OK)
             break;
-        if (!grains_again(run, &n, attempt, err))
+        if (!grains_again(run, &n, attempt, err)) {
+            // the step may be a good one for another worker, with the same bits where the set-ups are the same
+            run->back = moved ? run->back : run->back_set_up;
             return moved ? water_gave_up(run, attempt + 1, n <= 1, err) : silt_run_grains_failed(run, status, err);
+        }
     }
     if (scene->fluid.on && silt_run_bodies_free(run) && silt_seep_on(scene))
         silt_seep_accept(&run->seep, &run->bed, scene, run->nodes.p);
@@ -331,6 +347,8 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         run->ledger.dissipation += run->fluid.dissipated;
         run->ledger.external_work += run->fluid.worked;
     }
+    if (run->coupling)
+        bodies_gone(run);
     silt_run_balance(run);
     clock_advance(run, n);
     return SILT_OK;
@@ -385,8 +403,10 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
     silt_view view;
     silt_run_view(run, &view);
     silt_gauges_read(run->gauges, &view, run->gauge);
-    SILT_TRY(silt_history_row(run->history, &view, run->gauge, err));
-    if (run->tick == 0 && run->offset == 0)
+    run->back = -1; // where rows cannot be written checkpoints cannot either
+    if (!run->again)
+        SILT_TRY(silt_history_row(run->history, &view, run->gauge, err));
+    if (run->tick == 0 && run->offset == 0 && !run->again)
         SILT_TRY(silt_frame_write(run->out, (int)run->frame, &view, err));
     for (int k = 0; k < PHASE_COUNT; k++)
         run->summary.phase[k] += run->phase[k];
@@ -396,6 +416,8 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
         run->summary.most_iterations = run->fluid.iterations;
     run->summary.steps++;
     run->whole = true;
+    run->back = run->step;
+    run->back_set_up = silt_run_set_up_due(run, run->dt) ? run->step : run->back_set_up;
     double seconds[CLOCK_COUNT];
     silt_clock_read(seconds);
     run->output_seconds = seconds[CLOCK_output];

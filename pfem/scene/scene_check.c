@@ -423,6 +423,20 @@ static const char *check_nearest_column(const check_column *column, int n, const
     return nearest;
 }
 
+static const char *check_nearest_gauge(const silt_scene *scene, const char *name) {
+    const char *nearest = NULL;
+    int best = 3;
+    for (int k = 0; k < scene->n_gauge; k++) {
+        const char *gauge = scene->gauge[k].name;
+        const int distance = gauge ? silt_text_distance(name, gauge, best - 1) : best;
+        if (distance < best) {
+            best = distance;
+            nearest = gauge;
+        }
+    }
+    return nearest;
+}
+
 // by bisection
 static bool check_has_column(const check_column *column, int n, const char *name) {
     check_column wanted;
@@ -458,7 +472,13 @@ static void check_target(silt_reader *reader, const silt_scene *scene, int i, co
     } else if (check_has_column(column, n, check->column)) {
         return;
     }
-    const char *nearest = check_nearest_column(column, n, check->column);
+    // a column by the wrong key, which is no gauge
+    if (gauge && check_has_column(column, n, check->column)) {
+        silt_complain(reader, name, "key 'checks.%d.gauge': found '%.80s', which is a column of history.csv and no gauge, allowed column: %.80s", i, name->text,
+                      name->text);
+        return;
+    }
+    const char *nearest = gauge ? check_nearest_gauge(scene, check->column) : check_nearest_column(column, n, check->column);
     silt_complain(reader, name, "key 'checks.%d.%s': found '%.80s', allowed a %s%s%s%s", i, name->key, name->text,
                   gauge ? "gauge of this scene" : "column of history.csv", nearest ? "; did you mean '" : "",
                   nearest ? nearest : "", nearest ? "'?" : "");

@@ -25,8 +25,8 @@ awk -F'\t' '
     END {
         printf "# Stability\n\nOne scene each, over stiff and extreme ranges; made by `tests/atlas/atlas.sh SILT OUT > docs/stability.md`.\n\n"
         printf "%d runs, %.0f s of processor:", runs, cpu
-        split("ok cut-and-recovered warned refused failed unfinished hung crashed wrong", order, " ")
-        for (k = 1; k <= 9; k++)
+        split("ok cut-and-recovered warned beyond-bounds refused failed unfinished hung crashed wrong", order, " ")
+        for (k = 1; k <= 10; k++)
             printf "%s %d %s", (k > 1 ? "," : ""), count[order[k]], order[k]
         print ".\n"
     }' "$out"/*/runs/*.row
