@@ -481,7 +481,8 @@ static silt_status coupling_start(silt_coupling *c, int n, silt_error *err) {
     if (n > 0 && c->responds)
         silt_coupling_keep_old(c);
     SILT_RESERVE(c->force, c->force_capacity, 3 * c->n_last);
-    memset(c->force, 0, 3 * (size_t)c->n_last * sizeof *c->force);
+    if (c->n_last > 0) // else there may be no array
+        memset(c->force, 0, 3 * (size_t)c->n_last * sizeof *c->force);
     for (int i = 0, k = 0; i < c->n_grain; i++) {
         coupling_grain *g = &c->grain[i];
         memcpy(g->old_x, g->x, sizeof g->old_x);
@@ -593,6 +594,7 @@ static silt_status coupling_create(silt_coupling **coupling, const silt_coupling
     silt_coupling *c = *coupling = silt_alloc(1, sizeof *c);
     c->scene = def->scene;
     c->walls = def->walls;
+    c->box_margin = def->margin;
     c->dim = def->scene->dimension == 3 ? 3 : 2;
     c->next_id = c->sent_id = 1;
     c->view = silt_alloc(1, sizeof *c->view);
@@ -695,7 +697,10 @@ static void coupling_close(silt_coupling **coupling) {
 
 static double coupling_step(const silt_coupling *c) { return c->step; }
 
-static silt_body_state *coupling_bodies(const silt_coupling *c) { return c->bodies; }
+static silt_body_state *coupling_bodies(const silt_coupling *c) {
+    silt_coupling_bodies_gone(c);
+    return c->bodies;
+}
 
 static int coupling_process(const silt_coupling *c) { return silt_dem_process(c->dem); }
 

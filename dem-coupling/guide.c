@@ -7,6 +7,18 @@
 // s, end of substep k of the n that end when the walls stand where they are
 static double guide_time(const silt_coupling *c, int n, int k) { return c->walls->time - (n - k) * c->step; }
 
+void silt_coupling_bodies_gone(const silt_coupling *c) {
+    for (int i = 0; i < c->bodies->count; i++) {
+        struct silt_body *b = &c->bodies->body[i];
+        const double radius = c->dim == 3 ? c->body[i].skin.radius : c->body[i].shape.radius, margin = c->box_margin;
+        // half way out at most, so far from the end of the box that it stays in it
+        const double most = silt_min(0.9 * margin, silt_max(0.5 * margin, radius + 0.1 * margin));
+        b->gone = false;
+        for (int d = c->dem_def.periodic ? 1 : 0; d < c->dim && c->scene->body[i].motion == MOTION_FREE; d++)
+            b->gone |= b->x[d] < c->dem_def.lo[d] + most || b->x[d] > c->dem_def.hi[d] - most;
+    }
+}
+
 static bool guide_holds(const silt_body_def *def) { return def->held || def->release.on; }
 
 // of the scene's bodies, in the order that the worker has the free ones
@@ -40,7 +52,9 @@ static void guide_body(const silt_coupling *c, dem_guide *guide, dem_guided *to,
     const silt_body_def *def = &c->scene->body[i];
     const int n = guide->n_step;
     *to = (dem_guided){.slot = guide_slot(c, i), .held = def->held, .path = -1, .release = INT32_MAX, .force = HUGE_VAL};
-    if (def->motion == MOTION_PRESCRIBED) {
+    if (c->bodies->body[i].gone)
+        to->held = HELD_ALL;
+    else if (def->motion == MOTION_PRESCRIBED) {
         to->path = (*n_path)++;
         double(*row)[4] = dem_guide_path(guide, to->path);
         for (int k = 0; k <= n; k++) {
@@ -75,7 +89,7 @@ static void guide_ties(const silt_coupling *c, int i, dem_tie *to) {
 // a held body that was freed keeps what the scene holds for good
 static bool guide_needed(const silt_coupling *c, int i) {
     const silt_body_def *def = &c->scene->body[i];
-    return def->motion == MOTION_PRESCRIBED || (guide_holds(def) && (def->held || !c->body[i].freed));
+    return def->motion == MOTION_PRESCRIBED || c->bodies->body[i].gone || (guide_holds(def) && (def->held || !c->body[i].freed));
 }
 
 static void guide_walls(silt_coupling *c, dem_guide *guide) {

@@ -76,6 +76,7 @@ struct silt_coupling {
     silt_dem *dem;           // owned
     silt_dem_def dem_def;    // what it was opened with; its strings are borrowed
     int dim;                 // of the scene
+    double box_margin;       // m, of the box around what the scene spans
     double (*wall)[4];       // owned, plane: where LIGGGHTS has them
     double (*triangle)[10];  // owned, space: the same, see dem.h
     int *wall_motion;        // owned, per wall: which of the motions it follows, -1: none
@@ -200,6 +201,8 @@ void silt_coupling_wall_rates(silt_coupling *coupling, int m, int n, double (*ra
 // guide.c
 /** Tells the worker what guides bodies and walls in the next n substeps; nothing where nothing does. After silt_coupling_walls_go. */
 void silt_coupling_guide(silt_coupling *coupling, int n);
+/** marks free bodies that have left what the scene spans, by their place alone */
+void silt_coupling_bodies_gone(const silt_coupling *coupling);
 /** after the run: who was set free, what was traced */
 silt_status silt_coupling_guided(silt_coupling *coupling, silt_error *err);
 /** to and from a checkpoint: who was */

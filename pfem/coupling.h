@@ -18,6 +18,7 @@ typedef struct silt_coupling_def {
     const char *trace;       // OUT/trace.csv
     bool resumed;            // the run goes on from a checkpoint
     double lo[3], hi[3];     // the domain's box (with margin): what leaves it has left
+    double margin;           // m, of that box around what the scene spans
     double way_lo[3], way_hi[3]; // m, what walls with a motion span from the start to the end
 } silt_coupling_def;
 

@@ -387,6 +387,7 @@ typedef struct silt_body_state {
         double x[3], v[3], q[4], w[3]; // centroid, velocity, orientation (w, x, y, z), angular velocity
         double force[3], torque[3];    // of the water, N and N m per m of width, last step
         double contact[3];             // of contacts, mean of the last step
+        bool gone;                     // it has left what the scene spans: held where it is, without part in anything
         double mass;                   // kg
         double inertia[6];             // kg m2 about the centroid in the body's frame: xx, yy, zz, xy, xz, yz; in 2-D zz alone counts
         double volume;                 // m3; 2-D: m2

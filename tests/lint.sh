@@ -21,7 +21,8 @@ done
 
 # what gcc and clang print: FILE:LINE:COLUMN: warning: TEXT [CHECK]
 collect() {
-    sed -n "s|^$root/||; s|^\([^: ]*\):\([0-9]*\):[0-9]*: \(warning\|error\): .*\[\([^]]*\)\]\$|$1 \1 \4 \2|p" "$2" >> "$work/found"
+    sed -n "s#^$root/##; s#^\([^: ]*\):\([0-9]*\):[0-9]*: \(warning\|error\): .*\[\([^]]*\)\]\$#$1 \1 \4 \2#p" "$2" >> "$work/found"
+    ! grep -q ' warning: .*]$' "$2" || grep -q "^$1 " "$work/found" || { echo "lint.sh: what $1 says is not understood"; exit 2; }
 }
 
 for tool; do

@@ -16,13 +16,12 @@
 #define YEAR   315000 // frames of OUTPUT
 #define STEPS  10000
 
-static silt_run began(const silt_scene *scene, const char *folder, int64_t frame) {
+// into a place where it stays: a run has pointers to itself
+static void began(silt_run *run, const silt_scene *scene, const char *folder, int64_t frame) {
     static const silt_run_def def = {.quiet = true, .threads = 1, .worker = SILT_BINARY "/silt-dem"};
-    silt_run run = {0};
-    OK(silt_run_open(&run, scene, &def, folder, -1, &error));
-    run.frame = frame;
-    run.time = (double)frame * scene->time.output;
-    return run;
+    OK(silt_run_open(run, scene, &def, folder, -1, &error));
+    run->frame = frame;
+    run->time = (double)frame * scene->time.output;
 }
 
 static void closed(silt_run *run, char *folder) {
@@ -35,7 +34,9 @@ static void same_after_a_year(const char *text, int steps, double least) {
     char here[] = "/tmp/silt-clock-XXXXXX", there[] = "/tmp/silt-clock-XXXXXX";
     silt_scene *scene = scene_of(text);
     assert_true(mkdtemp(here) && mkdtemp(there));
-    silt_run a = began(scene, here, 0), b = began(scene, there, YEAR);
+    silt_run a, b;
+    began(&a, scene, here, 0);
+    began(&b, scene, there, YEAR);
     for (int k = 0; k < steps; k++) {
         OK(silt_run_advance(&a, &error));
         OK(silt_run_advance(&b, &error));

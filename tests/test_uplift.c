@@ -162,10 +162,25 @@ static void test_space(void **state) {
                   6, 0.01);
 }
 
+// 2 e e^T - f f^T + 3 g g^T with orthonormal e, f, g: without its negative part, which is known
+static void test_clip(void **state) {
+    (void)state;
+    const double axis[3][3] = {{2.0 / 3, 2.0 / 3, 1.0 / 3}, {-2.0 / 3, 1.0 / 3, 2.0 / 3}, {1.0 / 3, -2.0 / 3, 2.0 / 3}}, value[3] = {2, -1, 3};
+    double a[9] = {0}, kept[9] = {0};
+    for (int k = 0; k < 9; k++)
+        for (int m = 0; m < 3; m++) {
+            a[k] += value[m] * axis[m][k / 3] * axis[m][k % 3];
+            kept[k] += silt_max(value[m], 0) * axis[m][k / 3] * axis[m][k % 3];
+        }
+    assert_int_equal(silt_matrix_clip(3, a), 1);
+    for (int k = 0; k < 9; k++)
+        near(a[k], kept[k], 1e-13, "clipped");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_flat), cmocka_unit_test(test_lifted), cmocka_unit_test(test_tilted),
-        cmocka_unit_test(test_lid),  cmocka_unit_test(test_space),
+        cmocka_unit_test(test_lid),  cmocka_unit_test(test_space),  cmocka_unit_test(test_clip),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -140,7 +140,7 @@ typedef struct silt_summary {
     double phase[PHASE_COUNT];    // s, summed
     double node_steps;            // sum over steps of nodes
     double worst_volume_error, worst_sediment_error, worst_momentum_error;
-    int64_t steps, retries, iterations, most_iterations;
+    int64_t steps, retries, iterations, most_iterations, clipped; // clipped: motions of bodies whose inertia in the water was less than nought
     silt_bounds bounds;           // of the whole run; without rows: not measured
 } silt_summary;
 silt_status silt_summary_write(const char *out, const silt_view *view, const silt_summary *summary, silt_error *err);

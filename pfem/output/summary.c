@@ -141,6 +141,8 @@ static void summary_print(FILE *to, const silt_view *view, const silt_summary *s
     fprintf(to, "\"retries\": %lld,\n  ", (long long)summary->retries);
     fprintf(to, "\"iterations\": %lld,\n  ", (long long)summary->iterations);
     fprintf(to, "\"most_iterations\": %lld,\n  ", (long long)summary->most_iterations);
+    if (scene->n_body)
+        fprintf(to, "\"clipped\": %lld,\n  ", (long long)summary->clipped);
     silt_json_number(to, "seconds", summary->seconds, ",\n  ");
     silt_json_number(to, "node_steps", summary->node_steps, ",\n  ");
     silt_json_number(to, "microseconds_per_node_step", summary->seconds * per_node, ",\n  ");

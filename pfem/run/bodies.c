@@ -120,6 +120,7 @@ void silt_run_bodies_coast(silt_run *run) {
         run->body_after[b] = coasting(&bodies->body[b], run->dt);
     }
     run->film = silt_uplift_find(&run->uplift, run);
+    silt_uplift_owe(run->uplift, run);
     node_motion(run, run->body_before, run->body_after, 1);
 }
 
@@ -264,11 +265,11 @@ static bool moves(const silt_body_def *def, int mode) {
     return def->motion == MOTION_FREE && !(def->held >> (mode < 3 ? mode : 3) & 1);
 }
 
-// it waits for its release, which hangs on the force that acts on it as it stands; in the rest of the step in which that comes it moves
+// it has left for good, or waits for its release, which hangs on the force that acts on it as it stands; in the rest of the step in which that comes it moves
 // with its own mass
 static bool waits(const silt_run *run, int b) {
     const struct silt_body *body = &run->body_before[b];
-    return run->scene->body[b].release.on && silt_length(3, body->v) == 0 && silt_length(3, body->w) == 0;
+    return body->gone || (run->scene->body[b].release.on && silt_length(3, body->v) == 0 && silt_length(3, body->w) == 0);
 }
 
 static silt_impedance impedance_begin(const silt_run *run) {
@@ -409,39 +410,11 @@ static silt_status impedance_solve(silt_run *run, const silt_step *step, silt_im
     return status;
 }
 
-// Cholesky's factor of a symmetric matrix in its lower triangle; @return false: it is not positive definite
-static bool cholesky(int n, double *a) {
-    for (int j = 0; j < n; j++) {
-        for (int k = 0; k < j; k++)
-            for (int i = j; i < n; i++)
-                a[i * n + j] -= a[i * n + k] * a[j * n + k];
-        if (!(a[j * n + j] > 0))
-            return false;
-        const double root = sqrt(a[j * n + j]);
-        for (int i = j; i < n; i++)
-            a[i * n + j] /= root;
-    }
-    return true;
-}
-
-static void cholesky_solve(int n, const double *a, double *x) {
-    for (int i = 0; i < n; i++) {
-        for (int k = 0; k < i; k++)
-            x[i] -= a[i * n + k] * x[k];
-        x[i] /= a[i * n + i];
-    }
-    for (int i = n - 1; i >= 0; i--) {
-        for (int k = i + 1; k < n; k++)
-            x[i] -= a[k * n + i] * x[k];
-        x[i] /= a[i * n + i];
-    }
-}
-
 // acceleration of the free motions under `force` (size numbers); factor of mass + water over the live rows
 static void impedance_move(const silt_impedance *z, const double *factor, const double *force, double *live, double *acceleration) {
     for (int l = 0; l < z->n_live; l++)
         live[l] = force[z->live[l]];
-    cholesky_solve(z->n_live, factor, live);
+    silt_cholesky_solve(z->n_live, factor, live);
     memset(acceleration, 0, (size_t)z->size * sizeof(double));
     for (int l = 0; l < z->n_live; l++)
         acceleration[z->live[l]] = live[l];
@@ -505,6 +478,32 @@ silt_status silt_run_bodies_inertia(silt_run *run, const silt_step *step, int *s
     return status;
 }
 
+// factor of mass + water over the live rows. @return false: it is not positive
+static bool impedance_factor(const silt_impedance *z, double *factor) {
+    const int n = z->size, m = z->n_live;
+    for (int r = 0; r < m; r++)
+        for (int c = 0; c < m; c++)
+            factor[r * m + c] = z->mass[z->live[r] * n + z->live[c]] + z->water[z->live[r] * n + z->live[c]];
+    return silt_cholesky(m, factor);
+}
+
+// Takes out of the water's inertia what is less than nought, rows in units of the bodies' mass. @return how many motions
+static int impedance_clip(silt_impedance *z) {
+    const int n = z->size, m = z->n_live;
+    double *part = silt_alloc((size_t)(m * m) + 1, sizeof *part);
+    for (int r = 0; r < m; r++)
+        for (int c = 0; c < m; c++)
+            part[r * m + c] = z->water[z->live[r] * n + z->live[c]] /
+                              sqrt(z->mass[z->live[r] * n + z->live[r]] * z->mass[z->live[c] * n + z->live[c]]);
+    const int clipped = silt_matrix_clip(m, part);
+    for (int r = 0; r < m; r++)
+        for (int c = 0; c < m; c++)
+            z->water[z->live[r] * n + z->live[c]] =
+                part[r * m + c] * sqrt(z->mass[z->live[r] * n + z->live[r]] * z->mass[z->live[c] * n + z->live[c]]);
+    free(part);
+    return clipped;
+}
+
 // B and R of the step from the force on bodies that go on as they do
 static silt_status impedance_tell(silt_run *run, silt_impedance *z, const double *force, silt_error *err) {
     silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
@@ -512,12 +511,14 @@ static silt_status impedance_tell(silt_run *run, silt_impedance *z, const double
     double *factor = silt_alloc((size_t)m * (size_t)m + 1, sizeof *factor), *work = silt_alloc(6 * (size_t)n + 1, sizeof *work);
     double *load = work, *weight = work + n, *gyration = work + 2 * n, *a = work + 3 * n, *live = work + 4 * n, *out = work + 5 * n;
     silt_status status = SILT_OK;
-    for (int r = 0; r < m; r++)
-        for (int c = 0; c < m; c++)
-            factor[r * m + c] = z->mass[z->live[r] * n + z->live[c]] + z->water[z->live[r] * n + z->live[c]];
-    if (!cholesky(m, factor)) {
-        status = silt_fail(err, SILT_FAILED, "the water's inertia at the bodies is not positive");
-        goto done;
+    if (!impedance_factor(z, factor)) {
+        // what is added to the bodies' mass shall not be less than nought: what is, is left out, in the body's own units of mass
+        run->summary.clipped += impedance_clip(z);
+        silt_run_warn(run, "step %lld at t = %.9g s: the water's inertia at the bodies is not positive, its negative part is left out", (long long)run->step + 1, run->time);
+        if (!impedance_factor(z, factor)) {
+            status = silt_fail(err, SILT_FAILED, "the water's inertia at the bodies is no number");
+            goto done;
+        }
     }
     impedance_weight(run, z, weight, gyration);
     for (int r = 0; r < n; r++)

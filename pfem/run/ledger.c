@@ -103,6 +103,8 @@ void silt_run_ledger(silt_run *run) {
     for (int k = 0; k < run->n_waiting && scene->fluid.on; k++)
         ledger->fluid_volume -= run->waiting[k].mass / scene->bed.density;
     ledger->fluid_volume += ledger->flying_volume;
+    for (int b = 0; b < scene->n_body && run->body_water; b++)
+        ledger->fluid_volume += run->body_water[b].film;
     ledger->fluid_mass = rho * ledger->fluid_volume;
     ledger->volume_owed = ledger->owed_energy = 0;
     for (int i = 0; i < nodes->count; i++) {

@@ -125,12 +125,12 @@ static void run_failed(silt_run *run, silt_error *err) {
         run_go_back(run, &late);
     if (!err)
         return;
-    const size_t used = strlen(err->text), room = sizeof err->text - used;
     if (late.count)
-        snprintf(err->text + used, room, "\nno checkpoint of this state: %s", late.text);
-    else if (run->saved_step >= 0)
-        snprintf(err->text + used, room, "\nthe last checkpoint is of step %lld, t = %.9g s; go on from it with: silt resume %s",
-                 (long long)run->saved_step, run->saved_time, run->out);
+        snprintf(err->text + strlen(err->text), sizeof err->text - strlen(err->text), "\nno checkpoint of this state: %s", late.text);
+    if (run->saved_step >= 0)
+        snprintf(err->text + strlen(err->text), sizeof err->text - strlen(err->text),
+                 "\nthe last checkpoint is of step %lld, t = %.9g s; go on from it with: silt resume %s", (long long)run->saved_step, run->saved_time,
+                 run->out);
 }
 
 static double run_end(const silt_run *run) { return run->def.until > 0 ? run->def.until : run->scene->time.end; }

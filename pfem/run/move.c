@@ -140,12 +140,12 @@ static void place_bodies(silt_run *run) {
     }
 }
 
-// water that crossed an outlet, or left the box of the scene
+// water that crossed an outlet, or left the box of the scene; nodes of bodies, which are out of the water beyond an outlet
 static void let_out(silt_run *run) {
     silt_nodes *nodes = &run->nodes;
     const int D = silt_nodes_dim(nodes);
     for (int i = 0; i < nodes->count; i++) {
-        if (nodes->kind[i] != NODE_FLUID || run->memory.dead[i])
+        if ((nodes->kind[i] != NODE_FLUID && nodes->kind[i] != NODE_BODY) || run->memory.dead[i])
             continue;
         const double *x = nodes->x + D * i, *old = run->x_old + D * i;
         bool gone = false;
@@ -344,6 +344,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     // material motion; all nodes, so that the old cells hold what continuity gave them
     const double before = silt_mesh_volume(mesh, nodes->x);
     let_go(run);
+    const double squeezed = silt_uplift_give(run->uplift, run);
     silt_uplift_open(run->uplift, run);
     for (int i = 0; i < n; i++)
         if (mesh->wet[i])
@@ -359,7 +360,7 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     silt_run_levels(run);
     run->ledger.volume_solved += run->fluid.solved_volume;
     run->ledger.volume_given += run->fluid.given_back;
-    run->ledger.volume_moved += moved - before - run->fluid.solved_volume - run->fluid.given_back;
+    run->ledger.volume_moved += moved - before - run->fluid.solved_volume - run->fluid.given_back - squeezed;
     if (scene->fluid.air_pressure > 0)
         silt_pockets_advance(&run->pockets, scene, mesh, run->x_old, nodes->x);
     potential_add(run, 1);

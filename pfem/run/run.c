@@ -240,6 +240,18 @@ static void bed_resolved(silt_run *run) {
                        "too low; finer water at the bed, or bed.shear: log-law", run->bed.y_plus, BED_Y_PLUS);
 }
 
+// a body that has left: where, and what went with it
+static void bodies_gone(const silt_run *run) {
+    const silt_body_state *bodies = silt_coupling_dem.bodies(run->coupling);
+    for (int b = 0; b < run->n_body_before; b++) {
+        const struct silt_body *body = &bodies->body[b];
+        if (body->gone && !run->body_before[b].gone)
+            silt_run_warn(run, "body '%s' has left at (%g, %g, %g) and is held there: %g kg, momentum (%g, %g, %g) kg m/s", run->scene->body[b].name,
+                          body->x[0], body->x[1], body->x[2], body->mass, body->mass * body->v[0], body->mass * body->v[1],
+                          body->mass * body->v[2]);
+    }
+}
+
 static void bed_step(silt_run *run) {
     const double dt = silt_max(run->dt - run->wear_ahead, 0);
     run->wear_ahead = silt_max(run->wear_ahead - run->dt, 0);
@@ -335,6 +347,8 @@ static silt_status run_step(silt_run *run, silt_error *err) {
         run->ledger.dissipation += run->fluid.dissipated;
         run->ledger.external_work += run->fluid.worked;
     }
+    if (run->coupling)
+        bodies_gone(run);
     silt_run_balance(run);
     clock_advance(run, n);
     return SILT_OK;
@@ -389,6 +403,7 @@ silt_status silt_run_output(silt_run *run, silt_error *err) {
     silt_view view;
     silt_run_view(run, &view);
     silt_gauges_read(run->gauges, &view, run->gauge);
+    run->back = -1; // where rows cannot be written checkpoints cannot either
     if (!run->again)
         SILT_TRY(silt_history_row(run->history, &view, run->gauge, err));
     if (run->tick == 0 && run->offset == 0 && !run->again)

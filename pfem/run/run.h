@@ -23,10 +23,12 @@ typedef struct silt_rest {
 
 typedef struct silt_uplift silt_uplift; // uplift.c
 
-/** what is kept of the water at a body in space, in the body's frame */
+/** what is kept of the water at a body; the inertia in space with more bodies than one, in the body's frame */
 typedef struct silt_body_water {
     double inertia[36]; // kg, kg m, kg m2: its force and torque per acceleration, turned round
     double wet;         // nodes on the body when it was found, 0: never
+    double film;        // m3, water in films at the body: what it was when the step began, less what went to the mesh
+    double film_known;  // 1: it was found
 } silt_body_water;
 
 struct silt_run {
@@ -103,7 +105,7 @@ struct silt_run {
     double *body_velocity, *body_shift, *body_start; // owned, dim per node, see silt_step
     int body_start_capacity;
     silt_film *film;               // borrowed from uplift, NULL: there is none
-    silt_body_water *body_water;   // owned, in space with more bodies than one
+    silt_body_water *body_water;   // owned
     int body_water_capacity;
     double (*body_carry)[6];       // owned, N s and N m s per m: what the water gave bodies and they have not received yet
     silt_uplift *uplift;           // owned
@@ -122,6 +124,7 @@ struct silt_run {
     double *p_shown; // owned, 1 per node
     int x_old_capacity, v_old_capacity, debt_old_capacity, map_capacity, p_old_capacity, p_shown_capacity;
     double box_lo[3], box_hi[3]; // what lies outside has left
+    double box_margin;           // m, of that box around what the scene spans
     double way_lo[3], way_hi[3]; // what walls with a motion span from the start to the end
 };
 
@@ -168,11 +171,22 @@ silt_status silt_run_bodies_inertia(silt_run *run, const silt_step *step, int *s
  * from what they received is carried to the next step. */
 silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_error *err);
 
+// matrix.c --------------------------------------------------------------------------------------------
+/** Cholesky's factor of a symmetric matrix in its lower triangle; @return false: it is not positive definite */
+bool silt_cholesky(int n, double *a);
+void silt_cholesky_solve(int n, const double *factor, double *x);
+/** The symmetric part of a matrix without what of it is less than nought. @return how many of its values were */
+int silt_matrix_clip(int n, double *a);
+
 // uplift.c --------------------------------------------------------------------------------------------
 /** Films of water between bodies and what they are near to, of the present mesh and places. Makes *uplift at first. Nodes at mouths that
  * are shut are no free surface any more, until silt_uplift_open. @return borrowed from it; NULL: there are none */
 silt_film *silt_uplift_find(silt_uplift **uplift, silt_run *run);
-void silt_uplift_open(const silt_uplift *uplift, silt_run *run); // the step is over
+/** Before a step: what films hold now and what they should is owed to the water at their rims. */
+void silt_uplift_owe(silt_uplift *uplift, silt_run *run);
+/** The step is over, before nodes move: what films gave to the water. @return m3, of all */
+double silt_uplift_give(const silt_uplift *uplift, silt_run *run);
+void silt_uplift_open(const silt_uplift *uplift, silt_run *run); // after that: surfaces are surfaces
 void silt_uplift_free(silt_uplift **uplift);
 
 // ledger.c --------------------------------------------------------------------------------------------

@@ -38,6 +38,7 @@ void silt_coupling_def_fill(const silt_run *run, silt_coupling_def *def) {
                                .trace = run->trace};
     memcpy(def->lo, run->box_lo, sizeof def->lo);
     memcpy(def->hi, run->box_hi, sizeof def->hi);
+    def->margin = run->box_margin;
     memcpy(def->way_lo, run->way_lo, sizeof def->way_lo);
     memcpy(def->way_hi, run->way_hi, sizeof def->way_hi);
 }
@@ -121,6 +122,7 @@ void silt_run_box(silt_run *run) {
     double margin = 0;
     for (int d = 0; d < D; d++)
         margin = silt_max(margin, (run->walls.count ? 0.5 : 20) * (hi[d] - lo[d]));
+    run->box_margin = margin;
     for (int d = 0; d < D; d++) {
         run->box_lo[d] = lo[d] - margin;
         run->box_hi[d] = hi[d] + margin;

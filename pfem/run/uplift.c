@@ -23,7 +23,8 @@ struct silt_uplift {
     uint8_t *open;    // owned, per group: air comes to it
     int *place;       // owned, per node: in film.node, -1; then whatever is asked
     uint8_t *closed;  // owned, per facet of the water: a film presses back on it
-    int parent_capacity, sealed_capacity;
+    int parent_capacity, sealed_capacity, volume_capacity;
+    double *volume;   // owned, per body, m3 in its films as the step begins
     int *parent;      // owned, per node: pieces of water (silt_group_find)
     uint8_t *sealed;  // owned, per piece: 1 films are all that it has besides what is shut, 2: and it stays so
     int *at;          // owned, node of each number that bodies' nodes were given, -1
@@ -43,6 +44,7 @@ void silt_uplift_free(silt_uplift **uplift) {
     free(u->closed);
     free(u->parent);
     free(u->sealed);
+    free(u->volume);
     free(u->at);
     free(u->first);
     free(u->list);
@@ -452,6 +454,110 @@ static void mouths_shut(silt_uplift *u, silt_run *run) {
     for (int f = 0; f < mesh->n_facet && any; f++)
         for (int a = 0; a < D && mesh->facet_kind[f] == FACET_FREE && !u->closed[f]; a++)
             mesh->surface[mesh->facet[f][a]] = 1;
+}
+
+// ---- what films hold
+
+static double node_gap(const silt_run *run, int i) {
+    const int D = run->mesh.dim;
+    return solid_distance(run, run->nodes.owner[i], run->nodes.x + D * i, run->scene->fluid.size);
+}
+
+static int mouth_body(const silt_run *run, int f) {
+    int body = -1;
+    for (int a = 0; a < run->mesh.dim && body < 0; a++)
+        body = run->nodes.kind[run->mesh.facet[f][a]] == NODE_BODY ? run->nodes.owner[run->mesh.facet[f][a]] : -1;
+    return body;
+}
+
+// Water in the films that air does not come to: the way across, mean of a piece's corners, times its size; beyond a mouth too
+static void films_measure(silt_uplift *u, const silt_run *run) {
+    const silt_film *m = &u->film;
+    const int D = run->mesh.dim;
+    SILT_RESERVE(u->volume, u->volume_capacity, run->n_body_before + 1);
+    memset(u->volume, 0, (size_t)run->n_body_before * sizeof *u->volume);
+    double *gap = silt_alloc((size_t)m->n_node + 1, sizeof *gap);
+    for (int a = 0; a < m->n_node; a++)
+        gap[a] = u->open[group_of(u, m->node[a])] ? 0 : node_gap(run, m->node[a]);
+    for (int e = 0; e < m->n_element; e++) {
+        int corner[3] = {-1, -1, -1};
+        double normal[3], mean = 0;
+        for (int a = 0; a < D; a++) {
+            corner[a] = m->node[m->element[e][a]];
+            mean += gap[m->element[e][a]] / D;
+        }
+        silt_facet_mean_normal(&run->mesh, run->nodes.x, run->nodes.x, corner, normal);
+        u->volume[run->nodes.owner[corner[0]]] += mean * silt_length(D, normal);
+    }
+    free(gap);
+    for (int k = 0; k < m->n_mouth; k++) {
+        const int *facet = run->mesh.facet[m->mouth[k]];
+        double normal[3], mean = 0;
+        for (int a = 0; a < D; a++)
+            if (run->nodes.kind[facet[a]] == NODE_BODY && !u->open[group_of(u, facet[a])])
+                mean += node_gap(run, facet[a]) / D;
+        silt_facet_mean_normal(&run->mesh, run->nodes.x, run->nodes.x, facet, normal);
+        u->volume[mouth_body(run, m->mouth[k])] += mean * silt_length(D, normal);
+    }
+}
+
+void silt_uplift_owe(silt_uplift *u, silt_run *run) {
+    silt_nodes *nodes = &run->nodes;
+    SILT_RESERVE(run->body_water, run->body_water_capacity, run->n_body_before + 1);
+    films_measure(u, run);
+    for (int b = 0; b < run->n_body_before; b++) {
+        silt_body_water *water = &run->body_water[b];
+        if (!water->film_known) {
+            water->film_known = 1;
+            water->film = u->volume[b];
+            if (run->step == 0)
+                run->ledger.initial_volume += u->volume[b];
+        }
+        const double owed = water->film - u->volume[b];
+        if (owed == 0)
+            continue;
+        // its rim's nodes, or all that are wet
+        int n = 0, n_wet = 0;
+        for (int k = 0; k < u->film.n_node; k++)
+            n += u->film.rim[k] == FILM_WET && nodes->owner[u->film.node[k]] == b;
+        for (int k = 0; k < u->film.n_node && n; k++)
+            if (u->film.rim[k] == FILM_WET && nodes->owner[u->film.node[k]] == b)
+                nodes->debt[u->film.node[k]] += owed / n;
+        for (int pass = 0; pass < 2 && !n; pass++)
+            for (int i = 0; i < nodes->count; i++) {
+                const bool own = nodes->kind[i] == NODE_BODY && nodes->owner[i] == b && run->mesh.wet[i];
+                if (pass == 0)
+                    n_wet += own;
+                else if (own)
+                    nodes->debt[i] += owed / n_wet;
+            }
+        if (!n && !n_wet)
+            u->volume[b] = water->film;
+    }
+}
+
+double silt_uplift_give(const silt_uplift *u, silt_run *run) {
+    double all = 0;
+    if (!u)
+        return 0;
+    const silt_film *m = &u->film;
+    const int D = run->mesh.dim;
+    for (int b = 0; b < run->n_body_before; b++)
+        run->body_water[b].film = u->volume[b];
+    for (int a = 0; a < m->n_node; a++) {
+        run->body_water[run->nodes.owner[m->node[a]]].film -= run->dt * m->squeezed[a];
+        all += run->dt * m->squeezed[a];
+    }
+    for (int k = 0; k < m->n_mouth; k++) {
+        const int *facet = run->mesh.facet[m->mouth[k]];
+        double rate = 0;
+        for (int a = 0; a < D; a++)
+            for (int d = 0; d < D; d++)
+                rate += m->mouth_normal[k][d] * silt_mesh_velocity(&run->fluid, D * facet[a] + d) / D;
+        run->body_water[mouth_body(run, m->mouth[k])].film -= run->dt * rate;
+        all += run->dt * rate;
+    }
+    return all;
 }
 
 void silt_uplift_open(const silt_uplift *u, silt_run *run) {
