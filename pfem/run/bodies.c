@@ -382,6 +382,13 @@ static int wet_nodes(const silt_run *run, int b) {
     return n;
 }
 
+static int nodes_under(const silt_run *run, int b) {
+    int n = 0;
+    for (int k = 0; run->film && k < run->film->n_node; k++)
+        n += run->nodes.owner[run->film->node[k]] == b;
+    return n;
+}
+
 static bool lives(const silt_impedance *z, int k) {
     for (int l = 0; l < z->n_live; l++)
         if (z->live[l] / ROW == k)
@@ -395,12 +402,12 @@ static silt_status impedance_kept(silt_run *run, const silt_step *step, silt_imp
     double block[ROW * ROW];
     SILT_RESERVE(run->body_water, run->body_water_capacity, run->n_body_before + 1);
     for (int k = 0; k < z->n; k++) {
-        const int b = z->body[k], wet = wet_nodes(run, b);
+        const int b = z->body[k], wet = wet_nodes(run, b), under = nodes_under(run, b);
         if (!lives(z, k))
             continue;
         const double *q = run->body_before[b].q, back[4] = {q[0], -q[1], -q[2], -q[3]};
         silt_body_water *kept = &run->body_water[b];
-        if (run->step % z->n != k && fabs(wet - kept->wet) <= WET_CHANGED * kept->wet)
+        if (run->step % z->n != k && fabs(wet - kept->wet) <= WET_CHANGED * kept->wet && fabs(under - kept->under) <= WET_CHANGED * kept->under)
             continue;
         for (int m = 0; m < ROW; m++)
             SILT_TRY(impedance_column(run, step, z, room, ROW * k + m, err));
@@ -409,6 +416,7 @@ static silt_status impedance_kept(silt_run *run, const silt_step *step, silt_imp
             memcpy(block + ROW * r, z->water + (ROW * k + r) * z->size + ROW * k, ROW * sizeof *block);
         block_turned(back, block, kept->inertia);
         kept->wet = wet;
+        kept->under = under;
     }
     memset(z->water, 0, (size_t)z->size * (size_t)z->size * sizeof *z->water);
     for (int k = 0; k < z->n; k++) {
