@@ -268,11 +268,11 @@ done:
 void dem_link_close(dem_link *link) {
     if (!link->open)
         return;
-    // asked to end; killed when it is in the middle of something
+    // asked to end, which takes its time where others run too; killed when it is in the middle of something
     if (link->process > 0) {
         char word = DEM_CLOSE;
         bool idle = !link->busy && send(link->socket, &word, 1, MSG_NOSIGNAL) == 1;
-        link_reap(link, idle ? 2 : 0);
+        link_reap(link, idle ? 30 : 0);
     }
     if (link->shared)
         munmap(link->shared, link->shared->size);
