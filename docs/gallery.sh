@@ -69,16 +69,16 @@ run earth-dam earth-dam/scene.yaml
 run ten-tetrapods tetrapods/scene.yaml
 
 page dam-break 1.16 2900
-page temple 7 1900
+page temple 8 1900
 page earth-dam 4 2500 --slice y=0.4
 page ten-tetrapods 0.75 1900
 
 picture dam-break a 15
 picture dam-break b 58
 small dam-break.png "$work/a.png" "$work/b.png"
-picture temple a 40
-picture temple b 130
-picture temple c 180
+picture temple a 60
+picture temple b 156
+picture temple c 190
 small temple.png "$work/a.png" "$work/b.png" "$work/c.png"
 picture earth-dam a 8
 picture earth-dam b 16 --without water
