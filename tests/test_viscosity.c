@@ -376,6 +376,50 @@ static void test_wall_points(void **state) {
     }
 }
 
+// a body under the water brakes it to the bit as a wall with the same roughness does, one that slips not at all
+static void test_wall_points_of_a_body(void **state) {
+    (void)state;
+    for (int dim = 2; dim <= 3; dim++) {
+        column c;
+        column_open(&c, dim, 5, 0.4);
+        c.walls.roughness[0] = 0.01;
+        column_place(&c);
+        const size_t n = (size_t)c.nodes.count, bytes = n * (size_t)dim * sizeof(double);
+        for (size_t i = 0; i < n; i++)
+            c.v[(size_t)dim * i] = 3 * c.nodes.x[(size_t)dim * i + (size_t)dim - 1];
+        silt_wall_law_traction(&c.law, &c.scene, dim, c.v, c.friction, c.force);
+        double *force = silt_alloc(n, (size_t)dim * sizeof *force), *friction = silt_alloc(n, sizeof *friction);
+        memcpy(force, c.force, bytes);
+        memcpy(friction, c.friction, n * sizeof *friction);
+        assert_true(friction[0] > 0 && force[0] < 0);
+
+        silt_body_def body = {.condition = WALL_LAW, .roughness = 0.01};
+        c.scene.body = &body;
+        c.scene.n_body = 1;
+        for (int i = 0; i < c.plane; i++) {
+            c.nodes.kind[i] = NODE_BODY;
+            c.nodes.owner[i] = 0;
+        }
+        for (int k = 0; k < c.mesh.n_facet; k++)
+            if (c.mesh.facet_kind[k] == FACET_WALL)
+                c.mesh.facet_kind[k] = FACET_BODY;
+        assert_true(silt_scene_law(&c.scene));
+        column_place(&c);
+        assert_int_equal(c.law.n_point, c.plane);
+        silt_wall_law_traction(&c.law, &c.scene, dim, c.v, c.friction, c.force);
+        assert_memory_equal(c.force, force, bytes);
+        assert_memory_equal(c.friction, friction, n * sizeof *friction);
+        body.condition = WALL_SLIP;
+        column_place(&c);
+        assert_int_equal(c.law.n_point, 0);
+        c.scene.body = NULL;
+        c.scene.n_body = 0;
+        free(force);
+        free(friction);
+        column_close(&c);
+    }
+}
+
 // behind an edge of water that runs over dry wall the layer is young, and its stress that of Sakiadis
 static void test_young_layer(void **state) {
     (void)state;
@@ -519,6 +563,7 @@ int main(void) {
         cmocka_unit_test(test_films_of_mud),
         cmocka_unit_test(test_wall_stress),
         cmocka_unit_test(test_wall_points),
+        cmocka_unit_test(test_wall_points_of_a_body),
         cmocka_unit_test(test_young_layer),
         cmocka_unit_test(test_rough_channel),
         cmocka_unit_test(test_channel_starts),

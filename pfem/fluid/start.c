@@ -24,6 +24,20 @@ static void start_blow(silt_fluid *f, const silt_step *s) {
         for (int d = 0; d < D; d++)
             f->blow[D * i + d] = -f->theta * s->dt * (held[d] - loose[d]);
     }
+    if (!f->film || !f->blow || !(s->time > 0))
+        return;
+    // films pass it on, and nodes at their mouths, which go with the body
+    for (int i = 0; i < f->n_node; i++)
+        f->residual[i] = f->theta * s->dt * f->increment[i];
+    silt_film_press(f->film, D, f->residual, f->blow);
+    for (int k = 0; k < f->film->n_slave; k++) {
+        const int i = f->film->slave[k];
+        double part[3];
+        memcpy(part, f->scratch + D * i, (size_t)D * sizeof(double));
+        silt_film_free_part(f->film, k, D, part);
+        for (int d = 0; d < D; d++)
+            f->blow[D * i + d] -= f->theta * s->dt * part[d];
+    }
 }
 
 // The trapezoidal rule keeps whatever divergence the first velocity has and turns its sign from step to step: remeshing and

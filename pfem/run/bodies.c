@@ -146,6 +146,26 @@ static void force_add(const silt_run *run, int b, int i, const double force[3], 
     }
 }
 
+// The blow that makes the first velocity free of divergence acts where the body is as the step begins, the rest half way: about that place it
+// would turn a body that turns by the pressure's level, which hangs on nothing.
+static void blow_turn(const silt_run *run, double *out) {
+    const silt_nodes *nodes = &run->nodes;
+    const int D = silt_nodes_dim(nodes);
+    for (int i = 0; run->fluid.blow && i < run->fluid.n_node; i++) {
+        if (nodes->kind[i] != NODE_BODY || !run->mesh.wet[i])
+            continue;
+        const int b = nodes->owner[i];
+        double way[3] = {0}, blow[3] = {0}, torque[3];
+        for (int d = 0; d < D; d++) {
+            way[d] = nodes->x[D * i + d] - run->fluid.x_mid[D * i + d] + 0.5 * (run->body_after[b].x[d] - run->body_before[b].x[d]);
+            blow[d] = -run->fluid.blow[D * i + d] / run->dt;
+        }
+        cross(way, blow, torque);
+        for (int d = 0; d < 3; d++)
+            out[ROW * b + 3 + d] += torque[d];
+    }
+}
+
 /** Force and torque of the water on every body, about its place half way through the step; ROW per body. Slaves give it what walls do not
  * take. */
 static void sum_bodies(const silt_run *run, double *out) {
@@ -160,6 +180,7 @@ static void sum_bodies(const silt_run *run, double *out) {
         if (nodes->kind[i] == NODE_BODY)
             force_add(run, nodes->owner[i], i, force, out);
     }
+    blow_turn(run, out);
     for (int k = 0; run->film && k < run->film->n_slave; k++) {
         double force[3] = {0};
         for (int d = 0; d < D; d++)
@@ -361,6 +382,13 @@ static int wet_nodes(const silt_run *run, int b) {
     return n;
 }
 
+static int nodes_under(const silt_run *run, int b) {
+    int n = 0;
+    for (int k = 0; run->film && k < run->film->n_node; k++)
+        n += run->nodes.owner[run->film->node[k]] == b;
+    return n;
+}
+
 static bool lives(const silt_impedance *z, int k) {
     for (int l = 0; l < z->n_live; l++)
         if (z->live[l] / ROW == k)
@@ -374,12 +402,12 @@ static silt_status impedance_kept(silt_run *run, const silt_step *step, silt_imp
     double block[ROW * ROW];
     SILT_RESERVE(run->body_water, run->body_water_capacity, run->n_body_before + 1);
     for (int k = 0; k < z->n; k++) {
-        const int b = z->body[k], wet = wet_nodes(run, b);
+        const int b = z->body[k], wet = wet_nodes(run, b), under = nodes_under(run, b);
         if (!lives(z, k))
             continue;
         const double *q = run->body_before[b].q, back[4] = {q[0], -q[1], -q[2], -q[3]};
         silt_body_water *kept = &run->body_water[b];
-        if (run->step % z->n != k && fabs(wet - kept->wet) <= WET_CHANGED * kept->wet)
+        if (run->step % z->n != k && fabs(wet - kept->wet) <= WET_CHANGED * kept->wet && fabs(under - kept->under) <= WET_CHANGED * kept->under)
             continue;
         for (int m = 0; m < ROW; m++)
             SILT_TRY(impedance_column(run, step, z, room, ROW * k + m, err));
@@ -388,6 +416,7 @@ static silt_status impedance_kept(silt_run *run, const silt_step *step, silt_imp
             memcpy(block + ROW * r, z->water + (ROW * k + r) * z->size + ROW * k, ROW * sizeof *block);
         block_turned(back, block, kept->inertia);
         kept->wet = wet;
+        kept->under = under;
     }
     memset(z->water, 0, (size_t)z->size * (size_t)z->size * sizeof *z->water);
     for (int k = 0; k < z->n; k++) {

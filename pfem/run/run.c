@@ -342,6 +342,8 @@ static silt_status run_step(silt_run *run, silt_error *err) {
     SILT_TRY(status);
     if (scene->fluid.on) {
         silt_wall_forces(&run->walls, &run->nodes, &run->mesh, run->fluid.reaction, run->wall_force);
+        if (run->film)
+            silt_uplift_walls(run->uplift, run, run->wall_force);
         SILT_TRY(silt_run_move(run, err));
         seepage_book(run);
         run->ledger.dissipation += run->fluid.dissipated;

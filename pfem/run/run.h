@@ -27,6 +27,7 @@ typedef struct silt_uplift silt_uplift; // uplift.c
 typedef struct silt_body_water {
     double inertia[36]; // kg, kg m, kg m2: its force and torque per acceleration, turned round
     double wet;         // nodes on the body when it was found, 0: never
+    double under;       // nodes under films then
     double film;        // m3, water in films at the body: what it was when the step began, less what went to the mesh
     double film_known;  // 1: it was found
 } silt_body_water;
@@ -186,6 +187,8 @@ silt_film *silt_uplift_find(silt_uplift **uplift, silt_run *run);
 void silt_uplift_owe(silt_uplift *uplift, silt_run *run);
 /** The step is over, before nodes move: what films gave to the water. @return m3, of all */
 double silt_uplift_give(const silt_uplift *uplift, silt_run *run);
+/** after a step, before nodes move: force[wall] += what films press on walls with, N */
+void silt_uplift_walls(const silt_uplift *uplift, const silt_run *run, double (*force)[3]);
 void silt_uplift_open(const silt_uplift *uplift, silt_run *run); // after that: surfaces are surfaces
 void silt_uplift_free(silt_uplift **uplift);
 

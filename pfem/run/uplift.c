@@ -560,6 +560,50 @@ double silt_uplift_give(const silt_uplift *u, silt_run *run) {
     return all;
 }
 
+// the wall of the scene that x is nearest to, within reach; -1: something else is nearer
+static int nearest_wall(const silt_run *run, int b, const double *x, double reach) {
+    int element;
+    const double distance = run->walls.count ? fabs(silt_walls_distance(&run->walls, x, &element)) : HUGE_VAL;
+    return distance < reach && !(solid_distance(run, b, x, reach) < distance) ? run->walls.wall[element] : -1;
+}
+
+// middle of a facet or piece; @return its mean pressure
+static double facet_load(const silt_run *run, const int *corner, const double *p, const int *at, double middle[3]) {
+    const int D = run->mesh.dim;
+    double mean = 0;
+    memset(middle, 0, 3 * sizeof *middle);
+    for (int a = 0; a < D; a++) {
+        mean += p[at[a]] / D;
+        for (int d = 0; d < D; d++)
+            middle[d] += run->nodes.x[D * corner[a] + d] / D;
+    }
+    return mean;
+}
+
+void silt_uplift_walls(const silt_uplift *u, const silt_run *run, double (*force)[3]) {
+    const silt_film *m = u ? &u->film : NULL;
+    const int D = run->mesh.dim;
+    const double reach = run->scene->fluid.size;
+    for (int e = 0; m && e < m->n_element; e++) {
+        int corner[3] = {-1, -1, -1};
+        double middle[3];
+        for (int a = 0; a < D; a++)
+            corner[a] = m->node[m->element[e][a]];
+        const double p = facet_load(run, corner, m->work, m->element[e], middle);
+        const int wall = nearest_wall(run, run->nodes.owner[corner[0]], middle, reach);
+        for (int d = 0; d < D && wall >= 0; d++)
+            force[wall][d] += p * m->normal[e][d];
+    }
+    for (int k = 0; m && k < m->n_mouth; k++) {
+        const int *facet = run->mesh.facet[m->mouth[k]];
+        double middle[3];
+        const double p = facet_load(run, facet, run->nodes.p, facet, middle);
+        const int wall = nearest_wall(run, mouth_body(run, m->mouth[k]), middle, reach);
+        for (int d = 0; d < D && wall >= 0; d++)
+            force[wall][d] += p * m->mouth_normal[k][d];
+    }
+}
+
 void silt_uplift_open(const silt_uplift *u, silt_run *run) {
     for (int k = 0; u && k < u->film.n_mouth; k++)
         for (int a = 0; a < run->mesh.dim; a++)
