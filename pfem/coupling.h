@@ -68,7 +68,7 @@ typedef struct silt_coupling_type {
 
     /** true when a sphere fits there: overlap with grains, frozen spheres, bodies and walls at most 1 % of its radius.
      * Ask after bed_changed: the frozen spheres of a patch fill the place where its parcel goes. */
-    bool (*room)(const silt_coupling *coupling, const double *x, double radius);
+    bool (*room)(const silt_coupling *coupling, const double x[3], double radius);
     void (*release)(silt_coupling *coupling, int n, const silt_release *release); // queued
     void (*deposit)(silt_coupling *coupling, int grain);  // grain: index into grains(); becomes a frozen sphere, queued
     /** the bed's surface changed (bed->revision): the frozen spheres along it are brought up to date, queued */

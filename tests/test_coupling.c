@@ -221,13 +221,13 @@ static void test_release_deposit_save_load(void **unused) {
     near(2 * radius, cbrt(6 * 2.0 / 3 * 0.82 * 0.08 / 0.6 * 0.6 * 0.008 / M_PI), 1e-15, "diameter of a parcel");
 
     // the bed's crust is in the way below the surface, not above it
-    assert_false(dem->room(b.coupling, (double[2]){0.5, 0}, radius));
-    assert_true(dem->room(b.coupling, (double[2]){0.5, 1.05 * radius}, radius));
+    assert_false(dem->room(b.coupling, (double[3]){0.5, 0}, radius));
+    assert_true(dem->room(b.coupling, (double[3]){0.5, 1.05 * radius}, radius));
     silt_release release[2] = {{.x = {0.5, 1.1 * radius}, .radius = radius, .mass = mass},
                                {.x = {0.5, 3.3 * radius}, .v = {0.2, 0}, .radius = radius, .mass = mass}};
     dem->release(b.coupling, 2, release);
     assert_int_equal(dem->grains(b.coupling)->count, 2);
-    assert_false(dem->room(b.coupling, (double[2]){0.5, 1.5 * radius}, radius));
+    assert_false(dem->room(b.coupling, (double[3]){0.5, 1.5 * radius}, radius));
     for (int k = 0; k < 100; k++)
         bench_run(&b, 0.01);
     const silt_grain_state *grains = dem->grains(b.coupling);
@@ -250,12 +250,12 @@ static void test_release_deposit_save_load(void **unused) {
     assert_int_equal(grains->count, 1);
     bench_run(&b, 0.01);
     assert_int_equal(dem->grains(b.coupling)->count, 1);
-    assert_false(dem->room(b.coupling, (double[2]){place[0], place[1] + 1.5 * radius}, radius));
+    assert_false(dem->room(b.coupling, (double[3]){place[0], place[1] + 1.5 * radius}, radius));
     // the bed under it goes: so does the frozen sphere, and the crust comes lower
     for (int i = 0; i < 11; i++)
         b.x[i][1] = -0.3;
     dem->bed_changed(b.coupling, &b.bed);
-    assert_true(dem->room(b.coupling, (double[2]){place[0], place[1]}, radius));
+    assert_true(dem->room(b.coupling, (double[3]){place[0], place[1]}, radius));
     bench_run(&b, 0.1);
 
     // checkpoint: both go on to the same bits
@@ -354,8 +354,8 @@ static void test_body_on_the_bed(void **unused) {
     near(bodies->body[0].mass, 80, 1e-12, "mass per metre");
     near(bodies->body[0].inertia[2], 80 * 0.08 / 12, 1e-12, "inertia per metre");
     assert_int_equal(dem->outline(b.coupling, 0, 0.1, NULL, 0), 8);
-    assert_false(dem->room(b.coupling, (double[2]){0.5, 0.22}, 0.02));
-    assert_true(dem->room(b.coupling, (double[2]){0.5, 0.235}, 0.02));
+    assert_false(dem->room(b.coupling, (double[3]){0.5, 0.22}, 0.02));
+    assert_true(dem->room(b.coupling, (double[3]){0.5, 0.235}, 0.02));
     for (int lift = 0; lift < 2; lift++) {
         double mean = 0;
         for (int k = 0; k < 60; k++) {
