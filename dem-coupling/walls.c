@@ -71,7 +71,7 @@ void silt_coupling_wall_rates(silt_coupling *c, int m, int n, double (*rate)[4])
             rate[k][d] = (to[d] - from[d]) / c->step;
         memcpy(from, to, sizeof from);
     }
-    memcpy(c->towards[m], to, sizeof to);
+    memcpy(c->towards[m], from, sizeof from);
 }
 
 // LIGGGHTS adds up the way of a wall's pivot substep by substep: by such multiples the sum is exact, and a run that goes on from a
