@@ -11,6 +11,13 @@ static double kinetic_energy(const silt_fluid *f, const silt_step *s, const doub
     return sum;
 }
 
+static bool over_film(const silt_film *film, const silt_nodes *nodes, int body) {
+    for (int k = 0; k < film->n_node; k++)
+        if (nodes->owner[film->node[k]] == body)
+            return true;
+    return false;
+}
+
 // The impulse on bodies of what makes the first velocity free of divergence, with f->scratch as silt_fluid_correct leaves it. Where a body
 // strikes water it is most of the blow: the cells that come have the water's velocity on one side and the body's on the other. What a scene
 // gives at its start is made free of divergence without: the field is what the scene means, and no blow.
@@ -24,20 +31,10 @@ static void start_blow(silt_fluid *f, const silt_step *s) {
         for (int d = 0; d < D; d++)
             f->blow[D * i + d] = -f->theta * s->dt * (held[d] - loose[d]);
     }
-    if (!f->film || !f->blow || !(s->time > 0))
-        return;
-    // films pass it on, and nodes at their mouths, which go with the body
-    for (int i = 0; i < f->n_node; i++)
-        f->residual[i] = f->theta * s->dt * f->increment[i];
-    silt_film_press(f->film, D, f->residual, f->blow);
-    for (int k = 0; k < f->film->n_slave; k++) {
-        const int i = f->film->slave[k];
-        double part[3];
-        memcpy(part, f->scratch + D * i, (size_t)D * sizeof(double));
-        silt_film_free_part(f->film, k, D, part);
-        for (int d = 0; d < D; d++)
-            f->blow[D * i + d] -= f->theta * s->dt * part[d];
-    }
+    // a body over a film gets none: the next start would press the film back by what this one moved it, and so on
+    for (int i = 0; i < f->n_node && f->film && f->blow; i++)
+        if (s->nodes->kind[i] == NODE_BODY && over_film(f->film, s->nodes, s->nodes->owner[i]))
+            memset(f->blow + D * i, 0, (size_t)D * sizeof(double));
 }
 
 // The trapezoidal rule keeps whatever divergence the first velocity has and turns its sign from step to step: remeshing and
