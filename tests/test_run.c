@@ -7,36 +7,18 @@
 
 #include <cmocka.h>
 
-#include "check.h"
-#include "run.h"
+#include "run_folder.h"
 
 #include <unistd.h>
 
-#include <dirent.h>
 #include <sys/stat.h>
-
-static char folder[512];
 
 // a scene of the tree, with what is set in it, at its start in a folder of its own
 static void begin(silt_run *run, silt_scene **scene, const char *path, int n_set, const char *const *set) {
-    silt_run_def def = {.quiet = true};
     char full[1024];
     snprintf(full, sizeof full, "%s/%s", SILT_SOURCE, path);
     OK(silt_scene_read(full, n_set, set, scene, &error));
-    snprintf(folder, sizeof folder, "%s/tests/run-XXXXXX", SILT_BINARY);
-    assert_non_null(mkdtemp(folder));
-    OK(silt_run_open(run, *scene, &def, folder, -1, &error));
-}
-
-static void end(silt_run *run, silt_scene **scene) {
-    silt_run_free(run);
-    silt_scene_free(scene);
-    DIR *list = opendir(folder);
-    for (struct dirent *entry; list && (entry = readdir(list));)
-        if (entry->d_name[0] != '.')
-            unlinkat(dirfd(list), entry->d_name, 0);
-    closedir(list);
-    rmdir(folder);
+    folder_begin(run, *scene);
 }
 
 static void steps(silt_run *run, int n) {

@@ -8,14 +8,10 @@
 
 #include <cmocka.h>
 
-#include "check.h"
-#include "run.h"
+#include "run_folder.h"
 #include "scene_text.h"
 
-#include <dirent.h>
 #include <fcntl.h>
-
-static char folder[512];
 
 #define PLANE                                                                                                          \
     "silt: 1\ndimension: 2\ntime: {end: 1, output: 1, step: 1.0e-3}\ngravity: [0, -9.81]\n"                          \
@@ -26,22 +22,8 @@ static char folder[512];
 #define BLOCK(place) "bodies: [{name: block, shape: box, scale: 0.2, density: 2650, " place "}]\n"
 
 static void begin(silt_run *run, silt_scene **scene, const char *text) {
-    const silt_run_def def = {.quiet = true};
     *scene = scene_of(text);
-    snprintf(folder, sizeof folder, "%s/tests/uplift-XXXXXX", SILT_BINARY);
-    assert_non_null(mkdtemp(folder));
-    OK(silt_run_open(run, *scene, &def, folder, -1, &error));
-}
-
-static void end(silt_run *run, silt_scene **scene) {
-    silt_run_free(run);
-    silt_scene_free(scene);
-    DIR *list = opendir(folder);
-    for (struct dirent *entry; list && (entry = readdir(list));)
-        if (entry->d_name[0] != '.')
-            unlinkat(dirfd(list), entry->d_name, 0);
-    closedir(list);
-    rmdir(folder);
+    folder_begin(run, *scene);
 }
 
 // the water's step of a run that has just begun, before anything moves

@@ -23,7 +23,9 @@ static bool over_film(const silt_film *film, const silt_nodes *nodes, int body) 
 // gives at its start is made free of divergence without: the field is what the scene means, and no blow.
 static void start_blow(silt_fluid *f, const silt_step *s) {
     const int D = f->dim;
-    for (int i = 0; i < f->n_node && f->blow && s->time > 0; i++) {
+    if (!f->blow || !(s->time > 0))
+        return;
+    for (int i = 0; i < f->n_node; i++) {
         double held[3], loose[3];
         for (int d = 0; d < D; d++)
             held[d] = loose[d] = s->mesh->wet[i] && s->nodes->kind[i] == NODE_BODY ? f->scratch[D * i + d] : 0;
@@ -32,9 +34,16 @@ static void start_blow(silt_fluid *f, const silt_step *s) {
             f->blow[D * i + d] = -f->theta * s->dt * (held[d] - loose[d]);
     }
     // a body over a film gets none: the next start would press the film back by what this one moved it, and so on
-    for (int i = 0; i < f->n_node && f->film && f->blow; i++)
-        if (s->nodes->kind[i] == NODE_BODY && over_film(f->film, s->nodes, s->nodes->owner[i]))
+    int asked = -1; // nodes of a body stand one after the other
+    bool over = false;
+    for (int i = 0; i < f->n_node && f->film; i++) {
+        if (s->nodes->kind[i] != NODE_BODY)
+            continue;
+        if (s->nodes->owner[i] != asked)
+            over = over_film(f->film, s->nodes, asked = s->nodes->owner[i]);
+        if (over)
             memset(f->blow + D * i, 0, (size_t)D * sizeof(double));
+    }
 }
 
 // The trapezoidal rule keeps whatever divergence the first velocity has and turns its sign from step to step: remeshing and

@@ -16,15 +16,10 @@ static int modes(const silt_run *run, const int **mode) {
     return space ? 6 : 3;
 }
 
-static void cross(const double a[3], const double b[3], double out[3]) {
-    for (int d = 0; d < 3; d++)
-        out[d] = a[(d + 1) % 3] * b[(d + 2) % 3] - a[(d + 2) % 3] * b[(d + 1) % 3];
-}
-
 // p q, with w first
 static void quaternion_times(const double p[4], const double q[4], double out[4]) {
     double v[3];
-    cross(p + 1, q + 1, v);
+    silt_cross(p + 1, q + 1, v);
     out[0] = p[0] * q[0] - silt_dot(3, p + 1, q + 1);
     for (int d = 0; d < 3; d++)
         out[d + 1] = p[0] * q[d + 1] + q[0] * p[d + 1] + v[d];
@@ -50,7 +45,7 @@ void silt_run_body_velocity(const struct silt_body *body, const double *x, int d
     double arm[3] = {0}, turning[3];
     for (int d = 0; d < dim; d++)
         arm[d] = x[d] - body->x[d];
-    cross(body->w, arm, turning);
+    silt_cross(body->w, arm, turning);
     for (int d = 0; d < dim; d++)
         v[d] = body->v[d] + turning[d];
 }
@@ -85,7 +80,7 @@ static void rigid_motion(const silt_run *run, int i, const struct silt_body *a, 
         arm[d] = 0.5 * (x[d] - a->x[d] + end[d] - b->x[d]);
     for (int d = 0; d < 3; d++)
         spin[d] = a->w[d] + theta * (b->w[d] - a->w[d]);
-    cross(spin, arm, turning);
+    silt_cross(spin, arm, turning);
     for (int d = 0; d < D; d++) {
         v[d] = a->v[d] + theta * (b->v[d] - a->v[d]) + turning[d];
         shift[d] = (end[d] - x[d]) / run->dt - v[d];
@@ -139,7 +134,7 @@ static void node_arm(const silt_run *run, int b, int i, double arm[3]) {
 static void force_add(const silt_run *run, int b, int i, const double force[3], double *out) {
     double arm[3], torque[3];
     node_arm(run, b, i, arm);
-    cross(arm, force, torque);
+    silt_cross(arm, force, torque);
     for (int d = 0; d < 3; d++) {
         out[ROW * b + d] += force[d];
         out[ROW * b + 3 + d] += torque[d];
@@ -160,7 +155,7 @@ static void blow_turn(const silt_run *run, double *out) {
             way[d] = nodes->x[D * i + d] - run->fluid.x_mid[D * i + d] + 0.5 * (run->body_after[b].x[d] - run->body_before[b].x[d]);
             blow[d] = -run->fluid.blow[D * i + d] / run->dt;
         }
-        cross(way, blow, torque);
+        silt_cross(way, blow, torque);
         for (int d = 0; d < 3; d++)
             out[ROW * b + 3 + d] += torque[d];
     }
@@ -207,7 +202,7 @@ static void mode_at(const silt_run *run, int b, int mode, int i, double v[3]) {
     double axis[3] = {0}, arm[3];
     axis[mode % 3] = 1;
     node_arm(run, b, i, arm);
-    cross(axis, arm, v);
+    silt_cross(axis, arm, v);
     if (mode < 3)
         memcpy(v, axis, sizeof axis);
 }
@@ -469,7 +464,7 @@ static void impedance_weight(const silt_run *run, const silt_impedance *z, doubl
             weight[ROW * k + d] = body->mass * run->scene->gravity[d];
             weight[ROW * k + 3 + d] = 0;
         }
-        cross(body->w, moment, gyration + ROW * k + 3);
+        silt_cross(body->w, moment, gyration + ROW * k + 3);
     }
 }
 
