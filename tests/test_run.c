@@ -330,6 +330,30 @@ static void test_release_at_once(void **state) {
     release_at_once("bed.work=1.0e-3", "grains.per_patch=4", "grains.parcel=0.003", 39000);
 }
 
+// ---------------------------------------------------------------- water that is kept of a body
+
+// What is kept of the water at one of two spheres is no longer true: the step in which the water answers otherwise than it foresees makes the
+// next one find it anew, out of turn.
+static void test_water_anew(void **state) {
+    (void)state;
+    silt_run run;
+    silt_scene *scene;
+    begin(&run, &scene, "tests/scenes/space-pair.yaml", 0, NULL);
+    steps(&run, 2);
+    silt_body_water *water = &run.body_water[run.step % 2 ? 0 : 1]; // whose turn has just been
+    const double right = water->inertia[0];
+    assert_true(water->wet > 0 && right > 1);
+    for (int k = 0; k < 36; k++)
+        water->inertia[k] *= 0.1;
+    steps(&run, 1); // the other's turn
+    assert_float_equal(water->inertia[0], 0.1 * right, 1e-12 * right);
+    assert_true(water->wet == 0);
+    run.step++; // and the other's again
+    steps(&run, 1);
+    assert_float_equal(water->inertia[0], right, 0.05 * right);
+    end(&run, &scene);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_water_alone),
@@ -338,6 +362,7 @@ int main(void) {
         cmocka_unit_test(test_failed_step_prescribed),
         cmocka_unit_test(test_failed_step_thrown),
         cmocka_unit_test(test_release_at_once),
+        cmocka_unit_test(test_water_anew),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -134,6 +134,8 @@ void silt_hold_nodes(silt_fluid *fluid, const silt_step *step);
 /** Renews what holds nodes on bent walls, and on bodies where water slips, from the facets of the present midpoint mesh: with any
  * other normals a full tank cannot keep its volume. */
 void silt_hold_bent(silt_fluid *fluid, const silt_step *step);
+/** nodes that slide along something and whose cells have next to no volume (silt_fluid.volume) do not */
+void silt_hold_light(silt_fluid *fluid, const silt_step *step);
 /** whether water slips at a node of a body */
 bool silt_hold_slips(const silt_step *step, int i);
 /** Takes the bodies' motion anew: at the velocity that they are held at, where water slips its normal part. */

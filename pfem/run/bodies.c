@@ -6,6 +6,7 @@
 #define BODY_MOST 0.5  // of them, that it then moves
 #define ROW 6 // numbers of a body: force and torque, or velocity and angular velocity
 #define WET_CHANGED 0.25 // of a body's wet nodes: then what is kept of the water at it is old
+#define WATER_WRONG 0.25 // of all that acts on a body and moves it with its water: when the water gives it that much otherwise than foreseen, it is old too
 
 // rigid modes of a dimension
 static const int mode_plane[] = {0, 1, 5}, mode_space[] = {0, 1, 2, 3, 4, 5};
@@ -688,12 +689,14 @@ silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_er
         const silt_body_def *def = &run->scene->body[b];
         const struct silt_body *old = &run->body_before[b];
         const bool still = waits(run, b);
-        double off[3] = {0}, size = 0;
+        silt_body_water *water = run->body_water ? &run->body_water[b] : NULL;
+        double off[3] = {0}, size = 0, with_water = 0, wrong = 0;
         for (int d = 0; d < 3 && !still; d++) {
             // what moved it came of weight, contacts and water
             const double moved = body->mass * (body->v[d] - old->v[d]) / run->dt, weight = body->mass * run->scene->gravity[d];
             off[d] = moves(def, d) ? moved - weight - body->contact[d] - body->force[d] : 0;
             size += fabs(moved) + fabs(weight) + fabs(body->contact[d]) + fabs(body->force[d]);
+            with_water += water ? fabs(moved) * water->inertia[7 * d] / body->mass : 0;
         }
         if (size > 0)
             run->body_error = silt_max(run->body_error, silt_length(3, off) / size);
@@ -701,7 +704,10 @@ silt_status silt_run_bodies_answer(silt_run *run, const silt_step *step, silt_er
             double *told = d < 3 ? &body->force[d] : &body->torque[d - 3], *carry = &run->body_carry[b][d];
             *carry = !still && moves(def, d) ? *carry + run->dt * (force[ROW * b + d] - *told) : 0;
             *told = force[ROW * b + d];
+            wrong += d < 3 ? fabs(*carry) / run->dt : 0;
         }
+        if (water && wrong > WATER_WRONG * (size + with_water))
+            water->wet = 0;
     }
     free(force);
     return SILT_OK;
