@@ -26,7 +26,8 @@ typedef struct silt_uplift silt_uplift; // uplift.c
 /** what is kept of the water at a body; the inertia in space with more bodies than one, in the body's frame */
 typedef struct silt_body_water {
     double inertia[36]; // kg, kg m, kg m2: its force and torque per acceleration, turned round
-    double wet;         // nodes on the body when it was found, 0: never
+    double known;       // 0: to be found, 1: kept, 2: found in this step
+    double wet;         // nodes on the body when it was found
     double under;       // nodes under films then
     double film;        // m3, water in films at the body: what it was when the step began, less what went to the mesh
     double film_known;  // 1: it was found
