@@ -94,6 +94,7 @@ typedef struct silt_fluid {
     double theta;         // implicitness of the step: fluid.theta, more where viscosity is stiff
     silt_depth depth;     // owned, distances to walls and surface; empty where viscosity is the same everywhere
     silt_wall_law law;    // owned
+    silt_eddy eddy;       // owned, of spalart-allmaras
     silt_viscosity_report viscosity; // of the last step
 
     // of the last step

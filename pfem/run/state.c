@@ -38,6 +38,8 @@ silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
         status = silt_store_put(store, name, type, n * (per), array, err);
     STATE_NODES(PUT)
 #undef PUT
+    if (status == SILT_OK && run->nodes.eddy)
+        status = silt_store_put(store, "nodes/eddy", STORE_DOUBLE, n, run->nodes.eddy, err);
     if (status == SILT_OK)
         status = silt_store_put(store, "mesh/cell", STORE_INT, 4 * (size_t)run->mesh.n_cell, run->mesh.cell, err);
     if (status == SILT_OK)
@@ -101,6 +103,10 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
         SILT_TRY(silt_store_take(store, name, type, n * (per), array, err));
     STATE_NODES(TAKE)
 #undef TAKE
+    if (scene->fluid.on && silt_turbulence_model(scene) == TURBULENCE_SPALART_ALLMARAS) {
+        silt_nodes_eddies(&run->nodes);
+        SILT_TRY(silt_store_take(store, "nodes/eddy", STORE_DOUBLE, n, run->nodes.eddy, err));
+    }
     silt_walls_move(&run->walls, scene, run->time, 0);
     SILT_TRY(silt_store_count(store, "mesh/cell", &n_index, err));
     run->mesh.n_cell = (int)(n_index / 4);
