@@ -348,6 +348,33 @@ static void test_tip_on_water(void **state) {
     bench_close(&b);
 }
 
+// ---------------------------------------------------------------- a node without a mass
+
+// On a floor without friction a node that has nothing but a flat cell: it stays where it is.
+static void test_flat_cell(void **state) {
+    (void)state;
+    static const double x[5][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0.5, -1e-16}};
+    bench b;
+    bench_open(&b, "silt: 1\ntime: {end: 1, output: 1}\ngravity: [0, -10]\nfluid:\n  flow: laminar\n  density: 1000\n  viscosity: 0\n"
+                   "  size: 1\n  regions: [{box: [[0, 0], [1, 1]]}]\nwalls: [{polyline: [[-9, 0], [0.5, 0], [9, -0.1]], condition: slip}]\n");
+    silt_nodes_clear(&b.nodes);
+    for (int i = 0; i < 5; i++) {
+        silt_nodes_add(&b.nodes, NODE_FLUID, -1, x[i]);
+        b.nodes.wall[i][0] = i == 4 ? 1 : x[i][1] == 0 ? 0 : -1;
+        b.nodes.wall[i][1] = b.nodes.wall[i][2] = -1;
+    }
+    SILT_RESERVE(b.mesh.cell, b.mesh.cell_capacity, 3);
+    memcpy(b.mesh.cell, (const int[3][4]){{0, 1, 2, -1}, {0, 2, 3, -1}, {0, 4, 1, -1}}, 3 * sizeof *b.mesh.cell);
+    b.mesh.n_cell = 3;
+    b.mesh.walls = &b.walls;
+    silt_mesh_connect(&b.mesh, &b.nodes);
+    step(&b, 0.01);
+    assert_true(b.fluid.volume[4] < 1e-15);
+    assert_true(b.nodes.v[8] == 0 && b.nodes.v[9] == 0);
+    assert_true(b.nodes.v[2] > 0.01 && b.nodes.v[3] < 1e-12); // the others slide: the block spreads
+    bench_close(&b);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rest), cmocka_unit_test(test_stiff_rest),           cmocka_unit_test(test_free_fall),
@@ -357,6 +384,7 @@ int main(void) {
         cmocka_unit_test(test_debt_is_paid),
         cmocka_unit_test(test_crumb_flies),
         cmocka_unit_test(test_tip_on_water),
+        cmocka_unit_test(test_flat_cell),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
