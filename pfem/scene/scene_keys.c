@@ -6,7 +6,7 @@
 
 #define AT(type, field)           .offset = offsetof(type, field)
 #define MANY(type, number, field) .count = offsetof(type, number), .offset = offsetof(type, field)
-#define RANGE(from, to)           .low = from, .high = to
+#define RANGE(from, to)           .low = (from), .high = (to)
 #define POSITIVE                  .flags = KEY_OPEN_LOW, .low = 0, .high = HUGE_VAL
 #define NOT_NEGATIVE              .low = 0, .high = HUGE_VAL
 #define ONLY(kind)                (1u << (kind))
