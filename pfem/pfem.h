@@ -30,6 +30,7 @@ typedef struct silt_nodes {
     double *v;       // owned, dim per node, velocity, m/s
     double *p;       // owned, pressure, Pa
     double *h;       // owned, wanted distance to the neighbours, m; NULL where it is fluid.size everywhere (silt_node_h)
+    double *eddy;    // owned, m2/s, what Spalart and Allmaras carry with the water; NULL with another model or none
     double *debt;    // owned, m3: volume that remeshing took from the water here and that is owed to it (negative: too much)
     int64_t *id;     // owned, never used twice
     uint8_t *kind;   // owned, silt_node_kind
@@ -132,7 +133,8 @@ void silt_walls_contact(const silt_walls *walls, silt_nodes *nodes, const double
 // ---------------------------------------------------------------- nodes (node.c, seed.c)
 
 void silt_nodes_clear(silt_nodes *nodes);
-/** appends a node with zero fields; @return its index */
+/** appends a node with zero fields; @return its index. silt_nodes_eddies: from here on they have an eddy viscosity */
+void silt_nodes_eddies(silt_nodes *nodes);
 int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double *x);
 /** Removes nodes with dead[i] != 0, keeps the order; map[i] is the new index or -1 */
 void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map);

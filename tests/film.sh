@@ -35,6 +35,8 @@ expect 0 "$silt" draw "$out" --to "$work"
 difference=$(ffmpeg -v info -i "$work/film.mp4" -i "$work"/picture_*.png -filter_complex \
     "[0:v]select=eq(n\\,$((frames - 1)))[a];[1:v]crop=trunc(iw/2)*2:trunc(ih/2)*2[b];[a][b]psnr" -f null - 2>&1 | sed -n 's/.*average:\([0-9.inf]*\).*/\1/p')
 awk -v d="$difference" 'BEGIN { exit !(d == "inf" || d > 30) }' || fail "the last picture is $difference dB from the frame's"
+# a name that could be taken for an option or a protocol
+(cd "$work" && expect 0 "$silt" draw "$out" --film '-v:1.mp4' && cmp -- "-v:1.mp4" film.mp4)
 expect 0 "$silt" draw "$out" --film "$work/film.webp"
 [ "$(head -c 12 "$work/film.webp" | tail -c 4)" = WEBP ] || fail "the webp is none"
 say "$frames frames, the last $difference dB from its picture; $(wc -c <"$work/film.mp4") bytes as mp4, $(wc -c <"$work/film.webp") as webp"

@@ -17,7 +17,7 @@ command -v valgrind >/dev/null && command -v nm >/dev/null || { say "valgrind or
 export OMP_NUM_THREADS=1 GOMP_SPINCOUNT=2000 # set, the program does not begin once more
 
 # objects of the parts that a plain scene has not; level.c: of fluid and of run
-optional=' turbulence rheology wall_law tension air pocket level seepage seep bed bed_mesh bed_store bed_fill bed_space bed_law bed_cover bed_slope
+optional=' turbulence eddy rheology wall_law tension air pocket level seepage seep bed bed_mesh bed_store bed_fill bed_space bed_law bed_cover bed_slope
  bed_deposit bed_others bed_grow solid solid_mesh gmsh gmsh_module grains bodies uplift sediment feed gauge_grains verify_grains formula '
 # FUNCTION OBJECT, those of the coupling under the object "coupling"; a name that a needed object has too is no sign
 {

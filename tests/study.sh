@@ -67,6 +67,45 @@ expect 0 "$silt" study "$in/grid.yaml" -o "$work/plan" --collect
 same "$(column way_value "$work/plan/study.csv")" "$(column way_value "$work/whole/study.csv")" 'ways of the plan'
 say 'plan and collect'
 
+# without -o: the folder's name where the file is called study.yaml, else the file's; a plan's words go through a shell whatever stands in them
+own="$work/it's own"
+mkdir "$own" "$work/here"
+cp "$in/drop.yaml" "$own"
+cp "$in/grid.yaml" "$own/study.yaml"
+(cd "$work/here" && "$silt" study "$own/study.yaml" --plan -D "title=what's odd; exit 9" >"$work/plan.sh")
+same "$(wc -l <"$work/plan.sh")" 4 'lines of the plan with quotes'
+expect 0 sh "$work/plan.sh"
+same "$(ls "$work/here/it's own.study/runs" | tr '\n' ' ')" \
+    '00001.log 00001.row 00002.log 00002.row 00003.log 00003.row 00004.log 00004.row ' 'files of the plan with quotes'
+odd="what's odd; \`touch $work/here/ran\` & \"a_b\""
+(cd "$work/here" && expect 0 "$silt" study "$own/study.yaml" -D "title='$(echo "$odd" | sed "s/'/''/g")'" --collect)
+grep -qxF "## $odd" "$work/here/it's own.study/study.md" || fail 'another title'
+[ ! -e "$work/here/ran" ] || fail 'gnuplot ran what stands in the title'
+if command -v gnuplot >/dev/null; then
+    says '^4 runs: 4 ok'
+    ! grep -q gnuplot "$work/last.say" || fail 'gnuplot said something'
+    for plot in order cost map; do
+        grep -q "what's odd; .touch .* &amp; .*a_b" "$work/here/it's own.study/$plot.svg" || fail "no title in $plot"
+    done
+fi
+(cd "$work/here" && expect 0 "$silt" study "$in/grid.yaml" -q)
+[ -s "$work/here/grid.study/study.csv" ] || fail 'no folder of the name of the study'
+say 'names without -o, quotes in a plan'
+
+# a job's own process is killed: its run ends with it, and its row says what happened
+launch "$silt" study "$in/grid.yaml" -o "$work/lost" -D 'vary=[{key: fluid.size, values: [0.25]}]' -D 'set=[time.step=1.0e-5, time.end=100]'
+i=0
+while [ "$(rows "$work/lost/runs/00001.out")" -lt 3 ] && [ $i -lt 500 ]; do sleep 0.02; i=$((i + 1)); done
+job=$(children "$pid")
+run=$(children "$job")
+kill -KILL "$job"
+finish
+same "$code" 1 'exit code after a lost job'
+same "$(awk -F'\t' '$1 == "status" { print $2 }' "$work/lost/runs/00001.row")" crashed 'end of a lost job'
+grep -q 'ended by signal 9' "$work/lost/study.md" || fail 'study.md does not say that a job was lost'
+! alive "$run" || fail 'the run of a lost job goes on'
+say 'a lost job'
+
 # speed = way / time: 0.5 m/s and 1 m/s
 expect 0 "$silt" study "$in/seek.yaml" -o "$work/seek"
 awk '/^sought: time.end 0.1,/ { for (k = 1; k < NF; k++) if ($k == "fluid.velocity.vector") a = $(k + 2) }

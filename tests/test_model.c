@@ -78,6 +78,8 @@ static void test_warn(void **state) {
     warns(1, (const char *[]){"fluid.viscosity=0"}, 1, "1 smooth walls have the wall law");
     warns(2, (const char *[]){"fluid.rheology=bingham", "fluid.yield_stress=5"}, 1, "flow: laminar");
     warns(3, (const char *[]){"fluid.rheology=bingham", "fluid.yield_stress=5", "fluid.flow=laminar"}, 0, "");
+    warns(1, (const char *[]){"fluid.turbulence=spalart-allmaras"}, 0, "");
+    warns(2, (const char *[]){"fluid.turbulence=spalart-allmaras", "fluid.viscosity=0"}, 2, "makes eddies of eddies");
     warns(1, (const char *[]){"fluid.turbulence=wale"}, 1, "three-dimensional eddies");
     warns(2, (const char *[]){"walls.0.velocity=[1, 0]", "walls.0.condition=slip"}, 1,
           "which does not reach the water");

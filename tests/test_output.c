@@ -538,7 +538,7 @@ static void test_draw(void **state) {
     assert_int_equal(silt_draw(place("draw"), &(silt_draw_def){.frames = DRAW_ONE, .frame = 7}, NULL, &err), SILT_INPUT);
     contains(err.text, "has no frame 7; its frames are 0 to 1");
     assert_int_equal(silt_draw(place("draw"), &(silt_draw_def){.frames = DRAW_ONE, .field = "colour"}, NULL, &err), SILT_INPUT);
-    contains(err.text, "field colour is not known: mesh, pressure, speed, elevation, vorticity, porosity or bed");
+    contains(err.text, "field colour is not known: mesh, pressure, speed, elevation, vorticity, porosity, eddies or bed");
     silt_locator_clear(&w.locator);
 }
 

@@ -36,6 +36,9 @@ static bool has_air(const silt_run *run) {
 static bool has_depth(const silt_run *run) {
     return !zero(&run->fluid.depth, sizeof run->fluid.depth);
 }
+static bool has_eddies(const silt_run *run) {
+    return run->nodes.eddy || !zero(&run->fluid.eddy, sizeof run->fluid.eddy);
+}
 static bool has_law(const silt_run *run) {
     return run->fluid.wall_force || run->fluid.law.point;
 }
@@ -77,10 +80,11 @@ static const struct part {
     {"coupling", has_coupling, ",grain"}, {"bodies", has_bodies, ",block_"},
     {"fed grains", has_fed, ",fed_mass"}, {"levels", has_level, NULL},
     {"body force", has_central, NULL},   {"volume control", has_control, NULL},
+    {"eddies", has_eddies, NULL},
 };
 enum { N_PART = sizeof parts / sizeof *parts };
 enum { SIZES = 1, AIR = 2, DEPTH = 4, LAW = 8, IN_BED = 16, SEEPS = 32, COUPLED = 64, BODIES = 128, FED = 256, LEVELS = 512, CENTRAL = 1024,
-       CONTROL = 2048 };
+       CONTROL = 2048, EDDIES = 4096 };
 
 #define CONTACT "contact: {youngs_modulus: 1.0e7, poissons_ratio: 0.3, restitution: 0.5, friction: 0.5, rolling_friction: 0.1}\n"
 
@@ -182,6 +186,7 @@ static void test_plane(void **state) {
     see("sizes", NULL, HEAD "fluid: {flow: laminar, sizes: [{near: surface, size: 0.0399}], " COARSE "}\n" WALL, CONTROL | SIZES);
     see("air", NULL, HEAD "fluid: {flow: laminar, air_pressure: 1.0e5, " COARSE "}\n" WALL, CONTROL | AIR);
     see("turbulence", NULL, HEAD "fluid: {flow: turbulent, " COARSE "}\n" WALL, CONTROL | DEPTH);
+    see("eddies", NULL, HEAD "fluid: {turbulence: spalart-allmaras, " COARSE "}\n" WALL, CONTROL | DEPTH | EDDIES);
     see("law of the wall", NULL, HEAD "fluid: {flow: laminar, " COARSE "}\nwalls: [{polyline: [[0, 2], [0, 0], [2, 0], [2, 2]], condition: wall-law}]\n",
         CONTROL | LAW);
     see("body force", NULL, HEAD "fluid: {flow: laminar, body_force: {formula: central, rate: 0.1}, " COARSE "}\n" WALL, CONTROL | CENTRAL);

@@ -27,6 +27,7 @@ typedef struct column {
     silt_mesh mesh;
     silt_depth depth;
     silt_wall_law law;
+    silt_eddy eddy;
     double *flux, *grad, *volume, *inverse, *mu, *v, *friction, *force, *mass; // mass per row
     int passes;
 } column;
@@ -60,8 +61,11 @@ static inline void connect(column *c) {
                 bool known = false;
                 for (int q = m->neighbour_start[i]; q < count; q++)
                     known |= m->neighbour[q] == j;
-                if (!known)
-                    m->neighbour[count++] = j;
+                int at = count;
+                for (; !known && at > m->neighbour_start[i] && m->neighbour[at - 1] > j; at--) // rising
+                    m->neighbour[at] = m->neighbour[at - 1];
+                m->neighbour[at] = known ? m->neighbour[at] : j;
+                count += !known;
             }
     }
     m->neighbour_start[n] = count;
@@ -199,6 +203,7 @@ static inline void column_close(column *c) {
     silt_mesh_clear(&c->mesh);
     silt_depth_clear(&c->depth);
     silt_wall_law_clear(&c->law);
+    silt_eddy_clear(&c->eddy);
     free(c->grad);
     free(c->flux);
     free(c->inverse);
@@ -221,7 +226,7 @@ static inline void column_step(column *c, double g, double dt, int most) {
         old[r] = c->v[dim * r * c->plane];
     double change = HUGE_VAL;
     for (c->passes = 0; c->passes < most && change > 1e-10; c->passes++) {
-        silt_viscosity_update(&c->scene, &c->nodes, m, &c->depth, c->flux, c->inverse, c->v, c->passes == 0 ? 1 : 0.5, c->mu, NULL);
+        silt_viscosity_update(&c->scene, &c->nodes, m, &c->depth, &c->eddy, c->flux, c->inverse, c->v, c->passes == 0 ? 1 : 0.5, c->mu, NULL);
         silt_wall_law_traction(&c->law, &c->scene, dim, c->v, c->friction, c->force);
         for (int r = 0; r < n; r++) {
             diagonal[r] = c->mass[r] / dt;
@@ -277,6 +282,8 @@ static inline void column_step(column *c, double g, double dt, int most) {
 static inline void column_place(column *c) {
     silt_depth_update(&c->depth, &c->scene, &c->walls, &c->nodes, &c->mesh, c->nodes.x);
     silt_wall_law_place(&c->law, &c->scene, &c->walls, &c->nodes, &c->mesh, c->nodes.x);
+    if (c->nodes.eddy)
+        silt_eddy_place(&c->eddy, &c->nodes, &c->mesh, &c->depth, &c->law);
 }
 
 static inline double column_mean(const column *c) {

@@ -37,6 +37,7 @@ void silt_fluid_clear(silt_fluid *f) {
     silt_wall_normals_clear(&f->wall_normals);
     silt_depth_clear(&f->depth);
     silt_wall_law_clear(&f->law);
+    silt_eddy_clear(&f->eddy);
     silt_parts_clear(&f->parts);
     *f = (silt_fluid){0};
 }
@@ -248,8 +249,8 @@ static void resist(silt_fluid *f, const silt_step *s) {
         silt_levels_load(f, s);
     silt_assemble_geometry(f, s, s->dt);
     if (silt_viscosity_varies(s->scene) && (f->iterations < FLUID_CLOSURE || s->scene->fluid.rheology != RHEOLOGY_NEWTONIAN)) {
-        silt_viscosity_update(s->scene, s->nodes, s->mesh, &f->depth, f->flux, f->inverse, f->w, f->iterations ? 0.5 : 1, f->mu,
-                              &f->viscosity);
+        silt_viscosity_update(s->scene, s->nodes, s->mesh, &f->depth, &f->eddy, f->flux, f->inverse, f->w, f->iterations ? 0.5 : 1,
+                              f->mu, &f->viscosity);
         f->mu_max = 0;
         for (int e = 0; e < f->n_cell; e++)
             f->mu_max = silt_max(f->mu_max, f->mu[e]);
@@ -266,11 +267,12 @@ static void resist_begin(silt_fluid *f, const silt_step *s) {
         silt_depth_update(&f->depth, s->scene, s->walls, s->nodes, s->mesh, s->nodes->x);
     if (s->drag && s->scene->grains.eddy_limit > 0 && silt_turbulence_model(s->scene) != TURBULENCE_NONE)
         silt_depth_crowd(&f->depth, s->mesh, s->nodes->x, s->drag->solid, s->scene->grains.eddy_limit);
-    if (!silt_scene_law(s->scene))
-        return;
-    silt_wall_law_place(&f->law, s->scene, s->walls, s->nodes, s->mesh, s->nodes->x);
+    if (silt_scene_law(s->scene))
+        silt_wall_law_place(&f->law, s->scene, s->walls, s->nodes, s->mesh, s->nodes->x);
     if (f->law.n_point)
         SILT_RESERVE(f->wall_force, f->wall_capacity, f->dim * f->n_node + 1);
+    if (s->nodes->eddy)
+        silt_eddy_place(&f->eddy, s->nodes, s->mesh, &f->depth, &f->law);
 }
 
 // velocity with the pressure of the last iterate, from the right side in f->force, after silt_momentum_look at w where there is

@@ -96,6 +96,7 @@ typedef struct silt_fluid {
     double theta;         // implicitness of the step: fluid.theta, more where viscosity is stiff
     silt_depth depth;     // owned, distances to walls and surface; empty where viscosity is the same everywhere
     silt_wall_law law;    // owned
+    silt_eddy eddy;       // owned, of spalart-allmaras
     silt_viscosity_report viscosity; // of the last step
 
     // of the last step
@@ -139,6 +140,8 @@ void silt_hold_nodes(silt_fluid *fluid, const silt_step *step);
 /** Renews what holds nodes on bent walls, and on bodies where water slips, from the facets of the present midpoint mesh: with any
  * other normals a full tank cannot keep its volume. */
 void silt_hold_bent(silt_fluid *fluid, const silt_step *step);
+/** nodes that slide along something and whose cells have next to no volume (silt_fluid.volume) do not */
+void silt_hold_light(silt_fluid *fluid, const silt_step *step);
 /** whether water slips at a node of a body */
 bool silt_hold_slips(const silt_step *step, int i);
 /** Takes the bodies' motion anew: at the velocity that they are held at, where water slips its normal part. */
@@ -271,7 +274,8 @@ typedef struct silt_mode {
 } silt_mode;
 /** What the step that was just solved answers to a change of the velocity of bodies' nodes: motion, dim per node, also of those under
  * films, nought where nothing changes. Linear: the matrix of the step's end. Takes fluid->reaction as working space, and the film has no squeeze
- * then.  @param enough  of the residual at the start, at which the pressure is enough; 0: the usual */
+ * then.  @param enough  of the residual at the start, at which the pressure is enough; 0: the usual; less: no
+ * pressure is found, and the work of another mode's forces on this one's motion is right to first order of what that one leaves */
 silt_status silt_fluid_mode(silt_fluid *fluid, const silt_step *step, const double *motion, double enough, silt_mode *mode, silt_error *err);
 /** Work of the forces of mode b on the motion of mode a, N m/s per (m/s)^2: with A the operator of the velocity and K that of the pressure,
  * a A b + (K p_a).p_b and what is left of both, an error of second order. Symmetric but for rounding. */

@@ -292,6 +292,7 @@ void silt_assemble_geometry(silt_fluid *f, const silt_step *step, double dt) {
         shapes_anywhere(f, step->mesh, step->nodes->x);
         if (f->wall_normals.n_row || f->ride)
             silt_hold_bent(f, step);
+        silt_hold_light(f, step);
     }
     if (f->film)
         silt_film_place(f->film, step, f->x_mid, dt);

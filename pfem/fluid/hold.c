@@ -4,6 +4,7 @@
 #define BED_SQUARE 0.1  // cosine between a line of free motion and a wall that it may go along
 #define BODY_SMOOTH 0.866 // cosine of the largest turn, 30 degrees, of a body's facet from the normal of a node that slides
 #define BED_FLUSH 0.866 // cosine of the largest turn, 30 degrees, between bed and a wall that goes on from it
+#define HOLD_LIGHT 1e-6  // of h^dim, volume of a node that has no cells to speak of
 
 void silt_hold_project_held(const silt_fluid *f, int i, double *v) {
     const int D = f->dim;
@@ -422,6 +423,19 @@ void silt_hold_bent(silt_fluid *f, const silt_step *s) {
         memcpy(f->given + D * i, given, (size_t)D * sizeof(double));
     }
     hold_slaves(f, s, false);
+}
+
+// A node between walls may have nothing but a flat cell, 1e-17 of what others have: without a mass it would slip at any speed that the
+// pressure beside it asks for (cases/pier). It stays where it is; one that is free is spray.
+void silt_hold_light(silt_fluid *f, const silt_step *s) {
+    const int D = f->dim;
+    for (int i = 0; i < f->n_node; i++) {
+        const double h = silt_node_h(s->nodes, i, s->scene->fluid.size);
+        if (f->hold[i] == HOLD_FREE || f->hold[i] == HOLD_ALL || !s->mesh->wet[i] || !(f->volume[i] < HOLD_LIGHT * pow(h, D)))
+            continue;
+        f->hold[i] = HOLD_ALL;
+        memcpy(f->w + D * i, f->given + D * i, (size_t)D * sizeof(double));
+    }
 }
 
 void silt_hold_nodes(silt_fluid *f, const silt_step *s) {

@@ -177,7 +177,7 @@ silt_status silt_fluid_mode(silt_fluid *f, const silt_step *s, const double *mot
     f->potential = NULL;
     f->seep = NULL;
     silt_status status = mode_begin(f, s, mode, &room, err);
-    if (status == SILT_OK)
+    if (status == SILT_OK && !(enough < 0))
         status = mode_pressure(f, s, mode, enough > 0 ? enough : f->dim == 2 ? MODE_ENOUGH_PLANE : MODE_ENOUGH_SPACE, &room, err);
     f->potential = potential;
     f->seep = seep;

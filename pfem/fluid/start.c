@@ -11,13 +11,6 @@ static double kinetic_energy(const silt_fluid *f, const silt_step *s, const doub
     return sum;
 }
 
-static bool over_film(const silt_film *film, const silt_nodes *nodes, int body) {
-    for (int k = 0; k < film->n_node; k++)
-        if (nodes->owner[film->node[k]] == body)
-            return true;
-    return false;
-}
-
 // The impulse on bodies of what makes the first velocity free of divergence, with f->scratch as silt_fluid_correct leaves it. Where a body
 // strikes water it is most of the blow: the cells that come have the water's velocity on one side and the body's on the other. What a scene
 // gives at its start is made free of divergence without: the field is what the scene means, and no blow.
@@ -32,17 +25,6 @@ static void start_blow(silt_fluid *f, const silt_step *s) {
         silt_hold_project(f, i, loose);
         for (int d = 0; d < D; d++)
             f->blow[D * i + d] = -f->theta * s->dt * (held[d] - loose[d]);
-    }
-    // a body over a film gets none: the next start would press the film back by what this one moved it, and so on
-    int asked = -1; // nodes of a body stand one after the other
-    bool over = false;
-    for (int i = 0; i < f->n_node && f->film; i++) {
-        if (s->nodes->kind[i] != NODE_BODY)
-            continue;
-        if (s->nodes->owner[i] != asked)
-            over = over_film(f->film, s->nodes, asked = s->nodes->owner[i]);
-        if (over)
-            memset(f->blow + D * i, 0, (size_t)D * sizeof(double));
     }
 }
 

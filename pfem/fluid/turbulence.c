@@ -286,7 +286,7 @@ bool silt_viscosity_varies(const silt_scene *scene) {
 }
 
 void silt_viscosity_update(const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh, const silt_depth *depth,
-                           const double *flux, const double *inverse, const double *v, double blend, double *mu,
+                           const silt_eddy *carried, const double *flux, const double *inverse, const double *v, double blend, double *mu,
                            silt_viscosity_report *report) {
     const silt_fluid_def *fluid = &scene->fluid;
     const silt_turbulence model = silt_turbulence_model(scene);
@@ -303,7 +303,9 @@ void silt_viscosity_update(const silt_scene *scene, const silt_nodes *nodes, con
         const double rate = silt_shear_rate(dim, gradient);
 
         double eddy = 0;
-        if (model != TURBULENCE_NONE) {
+        if (model == TURBULENCE_SPALART_ALLMARAS)
+            eddy = silt_eddy_of_cell(carried, nodes, mesh, e, fluid->viscosity / fluid->density);
+        else if (model != TURBULENCE_NONE) {
             double d = 0, room = 0, s = 0, h = 0;
             bool law = false;
             for (int a = 0; a <= dim; a++) {

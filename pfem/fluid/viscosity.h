@@ -1,6 +1,6 @@
 /** @file viscosity.h
- * How water and mud resist being sheared: depth and distance to walls, eddy viscosity (turbulence.c), apparent viscosity of
- * yield-stress fluids (rheology.c), traction of walls whose boundary layer is thinner than a cell (wall_law.c); and the pull of
+ * How water and mud resist being sheared: depth and distance to walls, eddy viscosity (turbulence.c), eddies that go with the water
+ * (eddy.c), apparent viscosity of yield-stress fluids (rheology.c), traction of walls whose boundary layer is thinner than a cell (wall_law.c); and the pull of
  * the free surface (tension.c).
  * Everything works in two and three dimensions: positions and velocities have `dim` numbers a node, velocity gradients
  * dim * dim numbers, row d holding dv_d/dx_k.
@@ -11,6 +11,7 @@
  *   viscosity is stiff or changes much in a step
  *           silt_viscosity_update (blend 1 in the first, 0.5 after), silt_wall_law_traction
  *           momentum gets  - friction_i w_i + force_i  at wall nodes, friction_i joins the node's inertia
+ *   once    silt_eddy_advance, when the step is done
  */
 #ifndef SILT_VISCOSITY_H
 #define SILT_VISCOSITY_H
@@ -72,6 +73,8 @@ double silt_eddy_wale(int dim, double delta, const double *gradient);
 /** the model that a scene means: never TURBULENCE_AUTO */
 silt_turbulence silt_turbulence_model(const silt_scene *scene);
 
+typedef struct silt_eddy silt_eddy; // see eddy.c below
+
 /** what the viscosities of a step look like, for the report */
 typedef struct silt_viscosity_report {
     double eddy_mean, eddy_max; // Pa s, over cells (mean by volume)
@@ -83,6 +86,7 @@ bool silt_viscosity_varies(const silt_scene *scene);
 /** Viscosity of every cell: molecular or apparent (rheology) plus eddy viscosity.
  * Where the model is Smagorinsky or WALE, cells below the height at which the law of the wall looks at the water get at least
  * the mixing length's viscosity: nothing else there could carry the wall's traction into the water.
+ * @param eddy    placed; of spalart-allmaras, else not looked at
  * @param flux    (dim + 1) * dim per cell, node by node: its volume times the gradients of the shape functions
  * @param inverse one per cell, 1/volume
  * @param v       dim per node, m/s
@@ -91,7 +95,7 @@ bool silt_viscosity_varies(const silt_scene *scene);
  * @param mu      out, one per cell, Pa s
  * @param report  out, may be NULL */
 void silt_viscosity_update(const silt_scene *scene, const silt_nodes *nodes, const silt_mesh *mesh, const silt_depth *depth,
-                           const double *flux, const double *inverse, const double *v, double blend, double *mu,
+                           const silt_eddy *eddy, const double *flux, const double *inverse, const double *v, double blend, double *mu,
                            silt_viscosity_report *report);
 
 // ---------------------------------------------------------------- rheology.c
@@ -151,6 +155,41 @@ void silt_wall_law_place(silt_wall_law *law, const silt_scene *scene, const silt
 void silt_wall_law_traction(silt_wall_law *law, const silt_scene *scene, int dim, const double *v, double *friction,
                             double *force);
 void silt_wall_law_clear(silt_wall_law *law);
+
+// ---------------------------------------------------------------- eddy.c
+
+/** working space of the model of Spalart and Allmaras, whose unknown is silt_nodes.eddy; arrays grow only, valid when zeroed, empty with any other model */
+struct silt_eddy {
+    int node_capacity, link_capacity;
+    double *reach;  // owned, per node, m: distance to the wall that brakes and 0.03 k_s, the d of the model; HUGE_VAL: none
+    double *rough;  // owned, per node, m: k_s of that wall
+    double *held;   // owned, per node, m2/s: what wall or inlet prescribe; -1: free
+    double *share;  // owned, per node, m3 (plane: m2): water, each a part of the cells around
+    double *gain;   // owned, per node, m2/s2 times share: production and what else makes more
+    double *loss;   // owned, per node, share/s: destruction and what else makes less, over the value there
+    double *solve[4]; // owned, per node, working space of the solver
+    double *link;   // owned, one per neighbour in the mesh's lists, share/s: diffusion
+    int iterations; // of the last solve
+};
+
+/** m2/s, eddy viscosity nu_t = nu~ f_v1. @param value  nu~; @param d  m, distance with 0.03 rough, may be infinite; @param rough  k_s */
+double silt_eddy_viscosity(double nu, double value, double d, double rough);
+/** Production c_b1 S~ nu~ and destruction c_w1 f_w (nu~/d)^2, m2/s2. @param omega  1/s, size of the vorticity */
+void silt_eddy_sources(double nu, double value, double d, double rough, double omega, double *production, double *destruction);
+/** the first, of a cell's means */
+double silt_eddy_of_cell(const silt_eddy *eddy, const silt_nodes *nodes, const silt_mesh *mesh, int e, double nu);
+/** 1/s, size of the vorticity of a velocity gradient */
+double silt_vorticity(int dim, const double *gradient);
+/** Distances and roughness for the step's viscosities; after silt_depth_update, silt_depth_crowd and silt_wall_law_place. */
+void silt_eddy_place(silt_eddy *eddy, const silt_nodes *nodes, const silt_mesh *mesh, const silt_depth *depth, const silt_wall_law *law);
+/** What the nodes begin with: scene->fluid.eddy. After silt_depth_update. */
+void silt_eddy_start(const silt_scene *scene, silt_nodes *nodes, const silt_depth *depth);
+/** Production, destruction and diffusion over dt, once the step's velocity v is known; transport is the nodes' motion. Diffusion and
+ * destruction implicit: whatever dt, no value falls below nought. After silt_wall_law_traction.
+ * @param flux, inverse  as in silt_viscosity_update; @param volume  per cell */
+void silt_eddy_advance(silt_eddy *eddy, const silt_scene *scene, silt_nodes *nodes, const silt_mesh *mesh, const silt_depth *depth,
+                       const silt_wall_law *law, const double *flux, const double *inverse, const double *volume, const double *v, double dt);
+void silt_eddy_clear(silt_eddy *eddy);
 
 // ---------------------------------------------------------------- tension.c
 

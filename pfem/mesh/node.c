@@ -6,6 +6,7 @@ void silt_nodes_clear(silt_nodes *nodes) {
     free(nodes->v);
     free(nodes->p);
     free(nodes->h);
+    free(nodes->eddy);
     free(nodes->debt);
     free(nodes->id);
     free(nodes->kind);
@@ -32,6 +33,8 @@ static void nodes_reserve(silt_nodes *nodes, int need) {
     GROW(p, 1);
     if (nodes->h)
         GROW(h, 1);
+    if (nodes->eddy)
+        GROW(eddy, 1);
     GROW(debt, 1);
     GROW(id, 1);
     GROW(kind, 1);
@@ -39,6 +42,11 @@ static void nodes_reserve(silt_nodes *nodes, int need) {
     GROW(wall, 1);
 #undef GROW
     nodes->capacity = capacity;
+}
+
+void silt_nodes_eddies(silt_nodes *nodes) {
+    if (!nodes->eddy)
+        nodes->eddy = silt_alloc((size_t)nodes->capacity + 1, sizeof *nodes->eddy);
 }
 
 int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const double *x) {
@@ -52,6 +60,8 @@ int silt_nodes_add(silt_nodes *nodes, silt_node_kind kind, int owner, const doub
     nodes->p[i] = 0;
     if (nodes->h)
         nodes->h[i] = 0;
+    if (nodes->eddy)
+        nodes->eddy[i] = 0;
     nodes->debt[i] = 0;
     nodes->id[i] = nodes->next_id++;
     nodes->kind[i] = (uint8_t)kind;
@@ -78,6 +88,8 @@ void silt_nodes_compact(silt_nodes *nodes, const uint8_t *dead, int *map) {
             nodes->p[k] = nodes->p[i];
             if (nodes->h)
                 nodes->h[k] = nodes->h[i];
+            if (nodes->eddy)
+                nodes->eddy[k] = nodes->eddy[i];
             nodes->debt[k] = nodes->debt[i];
             nodes->id[k] = nodes->id[i];
             nodes->kind[k] = nodes->kind[i];
@@ -103,6 +115,8 @@ void silt_nodes_arrange(silt_nodes *nodes, const int *order) {
     arrange(nodes->p, sizeof *nodes->p, n, order, spare);
     if (nodes->h)
         arrange(nodes->h, sizeof *nodes->h, n, order, spare);
+    if (nodes->eddy)
+        arrange(nodes->eddy, sizeof *nodes->eddy, n, order, spare);
     arrange(nodes->debt, sizeof *nodes->debt, n, order, spare);
     arrange(nodes->id, sizeof *nodes->id, n, order, spare);
     arrange(nodes->kind, sizeof *nodes->kind, n, order, spare);

@@ -553,6 +553,8 @@ static void refine_insert(refinement *r, int a, int b, double share, bool closed
     for (int c = 0; c < dim; c++)
         nodes->v[dim * i + c] = (1 - share) * nodes->v[dim * a + c] + share * nodes->v[dim * b + c] + more[c];
     nodes->p[i] = (1 - share) * nodes->p[a] + share * nodes->p[b];
+    if (nodes->eddy)
+        nodes->eddy[i] = (1 - share) * nodes->eddy[a] + share * nodes->eddy[b];
     if (nodes->h)
         nodes->h[i] = (1 - share) * silt_node_h(nodes, a, r->h) + share * silt_node_h(nodes, b, r->h);
     for (int s = 0; s < n_wall; s++)
@@ -762,7 +764,8 @@ void silt_nodes_shuffle(silt_nodes *nodes, const silt_mesh *mesh, const silt_sce
     if (scene->fluid.shuffle <= 0)
         return;
     double *shift = silt_alloc((size_t)(3 * n) + 1, sizeof *shift), *change = silt_alloc((size_t)(4 * n) + 1, sizeof *change);
-    const double *const value[2] = {nodes->p, nodes->v};
+    const double *const value[2] = {nodes->p, nodes->v}, *const eddy[1] = {nodes->eddy};
+    double *more = nodes->eddy ? silt_alloc((size_t)n + 1, sizeof *more) : NULL;
     for (int i = 0; i < n; i++) {
         if (i >= mesh->n_node || !mesh->wet[i] || mesh->surface[i] || nodes->kind[i] != NODE_FLUID || nodes->wall[i][0] >= 0)
             continue;
@@ -779,9 +782,16 @@ void silt_nodes_shuffle(silt_nodes *nodes, const silt_mesh *mesh, const silt_sce
         for (int f = 0; f <= dim; f++)
             for (int d = 0; d < dim; d++)
                 change[4 * i + f] += gradient[f][d] * shift[3 * i + d];
+        if (!more)
+            continue;
+        shuffle_gradient(mesh, dim, nodes->x, i, 1, eddy, gradient);
+        for (int d = 0; d < dim; d++)
+            more[i] += gradient[0][d] * shift[3 * i + d];
     }
     for (int i = 0; i < n; i++) {
         nodes->p[i] += change[4 * i];
+        if (more)
+            nodes->eddy[i] = silt_max(nodes->eddy[i] + more[i], 0);
         for (int d = 0; d < dim; d++) {
             nodes->x[dim * i + d] += shift[3 * i + d];
             nodes->v[dim * i + d] += change[4 * i + 1 + d];
@@ -789,4 +799,5 @@ void silt_nodes_shuffle(silt_nodes *nodes, const silt_mesh *mesh, const silt_sce
     }
     free(shift);
     free(change);
+    free(more);
 }

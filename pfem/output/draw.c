@@ -20,6 +20,7 @@ static const silt_draw_field draw_fields[] = {
     {"speed", "speed, m/s", "PointData/velocity", NULL, MADE_LENGTH, DRAW_MAP(draw_water)},
     {"pressure", "pressure, Pa", "PointData/pressure", "PointData/pressure", MADE_LENGTH, DRAW_MAP(draw_map)},
     {"porosity", "porosity", "PointData/porosity", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
+    {"eddies", "eddy viscosity, m²/s", "PointData/eddy_viscosity", NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
     {"elevation", "elevation, m", "PointData/pressure", NULL, MADE_ELEVATION, DRAW_MAP(draw_water)},
     {"vorticity", "vorticity, 1/s", "PointData/velocity", NULL, MADE_VORTICITY, DRAW_MAP(draw_turn)},
     {"mesh", NULL, NULL, NULL, MADE_LENGTH, DRAW_MAP(draw_map)},
@@ -107,7 +108,7 @@ static silt_status draw_asked(silt_draw_canvas *c, const silt_draw_def *def, sil
             c->field = &draw_fields[i];
     if (!c->field)
         return silt_fail(err, SILT_INPUT,
-                         "field %s is not known: mesh, pressure, speed, elevation, vorticity, porosity or bed", def->field);
+                         "field %s is not known: mesh, pressure, speed, elevation, vorticity, porosity, eddies or bed", def->field);
     if (def->slice && !draw_plane(def->slice, c))
         return silt_fail(err, SILT_INPUT, "slice %s is no plane: for example y=0.5", def->slice);
     if (def->without && !draw_without(def->without, c))

@@ -45,9 +45,10 @@ static int film_start(const film_kind *kind, int width, int height, double rate,
     int n = 14;
     for (int k = 0; kind->option[k]; k++)
         argument[n++] = kind->option[k];
-    argument[n] = path;
     if (pipe(ends) != 0)
         return errno;
+    char *name = silt_text("file:%s", path); // a name with : or - in front is one all the same
+    argument[n] = name;
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, ends[0], STDIN_FILENO);
@@ -55,6 +56,7 @@ static int film_start(const film_kind *kind, int width, int height, double rate,
     posix_spawn_file_actions_addclose(&actions, ends[1]);
     const int reason = posix_spawnp(child, "ffmpeg", &actions, NULL, (char *const *)(uintptr_t)argument, environ);
     posix_spawn_file_actions_destroy(&actions);
+    free(name);
     close(ends[0]);
     *pipe_end = ends[1];
     if (reason)

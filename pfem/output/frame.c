@@ -203,6 +203,8 @@ static silt_status frame_fluid(const char *out, int number, const silt_view *vie
     frame_grid(&f, c.n, c.x, n_cell, offset, link, type);
     frame_field(&f, &c, "velocity", dim, nodes->v);
     frame_field(&f, &c, "pressure", 1, nodes->p);
+    if (nodes->eddy)
+        frame_field(&f, &c, "eddy_viscosity", 1, nodes->eddy);
     double *porosity = silt_alloc(n + 1, sizeof *porosity);
     int64_t *id = silt_alloc((size_t)c.n + 1, sizeof *id);
     uint8_t *kind = silt_alloc((size_t)c.n + 1, 1);
@@ -499,6 +501,8 @@ static uint64_t frame_hash(const silt_view *view) {
         hash = silt_hash(hash, view->nodes->x, size);
         hash = silt_hash(hash, view->nodes->v, size);
         hash = silt_hash(hash, view->nodes->p, one);
+        if (view->nodes->eddy)
+            hash = silt_hash(hash, view->nodes->eddy, one);
     }
     if (view->grains && view->grains->count) {
         size_t size = 3 * (size_t)view->grains->count * sizeof(double);

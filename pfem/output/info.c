@@ -10,7 +10,7 @@
 
 // which equations the water gets: turbulence, rheology, walls, time, sizes, air, forces
 static void info_model(const silt_scene *scene, FILE *to) {
-    static const char *const turbulence[] = {"", "no turbulence model", "mixing length", "Smagorinsky", "WALE"};
+    static const char *const turbulence[] = {"", "no turbulence model", "mixing length", "Smagorinsky", "WALE", "Spalart-Allmaras"};
     static const char *const near[] = {"", "regions", "walls", "bed", "bodies", "the surface"};
     static const char *const formula[] = {"at rest", "uniform",      "solid rotation", "shear",
                                           "strain",  "Taylor-Green", "standing wave",  "solitary wave",

@@ -68,6 +68,7 @@ void silt_info_parts(const silt_scene *scene, FILE *to) {
         {"water", fluid->on},
         {"sizes", fluid->n_size > 0},
         {"turbulence model", fluid->on && fluid->turbulence > TURBULENCE_NONE},
+        {"eddies that go with the water", fluid->on && fluid->turbulence == TURBULENCE_SPALART_ALLMARAS},
         {"law of the wall", fluid->on && law},
         {"openings with levels", levels},
         {"body force", fluid->force.kind != 0},

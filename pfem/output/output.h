@@ -177,7 +177,7 @@ typedef enum { DRAW_LAST = 0, DRAW_ALL, DRAW_ONE } silt_draw_frames;
 typedef struct silt_draw_def {
     silt_draw_frames frames;
     int frame;           // of DRAW_ONE
-    const char *field;   // mesh, pressure, speed, elevation, vorticity, porosity, bed; NULL: speed
+    const char *field;   // mesh, pressure, speed, elevation, vorticity, porosity, eddies, bed; NULL: speed
     const char *slice;   // "y=0.5": a plane cut through three dimensions; NULL: none
     const char *without; // "water,grains": what is left out, of water, bed, grains, bodies, walls; NULL: nothing
     const char *to;      // folder of the pictures; NULL: OUT

@@ -46,7 +46,7 @@ static const struct argp_option main_options[] = {
     {"force", LONG_ONLY(OPTION_FORCE), NULL, 0, "replace an output folder that is there", 0},
     {"worker", LONG_ONLY('w'), "PATH", OPTION_HIDDEN, "the silt-dem program", 0},
     {"frame", LONG_ONLY(OPTION_FRAME), "N|all", 0, "the frame to draw; default: the last", 0},
-    {"field", LONG_ONLY(OPTION_FIELD), "NAME", 0, "speed (default), pressure, elevation, vorticity, porosity, mesh or bed", 0},
+    {"field", LONG_ONLY(OPTION_FIELD), "NAME", 0, "speed (default), pressure, elevation, vorticity, porosity, eddies, mesh or bed", 0},
     {"slice", LONG_ONLY(OPTION_SLICE), "PLANE", 0, "a cut through three dimensions, for example y=0.5", 0},
     {"without", LONG_ONLY(OPTION_WITHOUT), "PARTS", 0, "leave out water, bed, grains, bodies or walls; several with commas between", 0},
     {"film", LONG_ONLY(OPTION_FILM), "FILE", 0, "all frames as a moving picture: FILE.mp4, .webm, .webp or .gif (made by ffmpeg)", 0},

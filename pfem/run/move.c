@@ -347,6 +347,9 @@ static silt_status nodes_move(silt_run *run, silt_error *err) {
     const double h = scene->fluid.size, rho = scene->fluid.density;
     const int n = nodes->count, D = silt_nodes_dim(nodes);
 
+    if (nodes->eddy)
+        SILT_CLOCKED(assemble, silt_eddy_advance(&run->fluid.eddy, scene, nodes, mesh, &run->fluid.depth, &run->fluid.law, run->fluid.flux,
+                                                 run->fluid.inverse, run->fluid.cell_volume, run->fluid.w, run->dt));
     silt_clock_to(CLOCK_move);
     // material motion; all nodes, so that the old cells hold what continuity gave them
     const double before = silt_mesh_volume(mesh, nodes->x);

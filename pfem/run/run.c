@@ -470,6 +470,7 @@ void silt_run_free(silt_run *run) {
     free(run->body_start);
     free(run->body_carry);
     free(run->body_water);
+    free(run->body_inertia);
     silt_uplift_free(&run->uplift);
     free(run->x_old);
     free(run->p_old);

@@ -23,10 +23,10 @@ typedef struct silt_rest {
 
 typedef struct silt_uplift silt_uplift; // uplift.c
 
-/** what is kept of the water at a body; the inertia in space with more bodies than one, in the body's frame */
+/** what is kept of the water at a body; all but the film in space with more bodies than one */
 typedef struct silt_body_water {
-    double inertia[36]; // kg, kg m, kg m2: its force and torque per acceleration, turned round
-    double wet;         // nodes on the body when it was found, 0: never
+    double known;       // 0: to be found, 1: kept, 2: found in this step
+    double wet;         // nodes on the body when it was found
     double under;       // nodes under films then
     double film;        // m3, water in films at the body: what it was when the step began, less what went to the mesh
     double film_known;  // 1: it was found
@@ -107,7 +107,8 @@ struct silt_run {
     int body_start_capacity;
     silt_film *film;               // borrowed from uplift, NULL: there is none
     silt_body_water *body_water;   // owned
-    int body_water_capacity;
+    int body_water_capacity, body_inertia_capacity;
+    double *body_inertia;          // owned, (6 n_body_before)^2, kg, kg m, kg m2: its inertia as it is kept in the bodies' frames; NULL: it is not
     double (*body_carry)[6];       // owned, N s and N m s per m: what the water gave bodies and they have not received yet
     silt_uplift *uplift;           // owned
     double body_error;             // what weight, contacts and water leave open of bodies' momentum, relative to them

@@ -273,6 +273,11 @@ silt_status silt_run_first(silt_run *run, silt_error *err) {
     grains_small(run);
     silt_size_update(run->size, &run->nodes, &run->mesh);
     SILT_TRY(silt_run_pockets(run, err));
+    if (silt_turbulence_model(scene) == TURBULENCE_SPALART_ALLMARAS) {
+        silt_nodes_eddies(&run->nodes);
+        silt_depth_update(&run->fluid.depth, scene, &run->walls, &run->nodes, &run->mesh, run->nodes.x);
+        silt_eddy_start(scene, &run->nodes, &run->fluid.depth);
+    }
     // nodes of the cloud that got no cell at the start are no drops: they hold no water
     silt_run_locate(run);
     return SILT_OK;

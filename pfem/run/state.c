@@ -38,6 +38,8 @@ silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
         status = silt_store_put(store, name, type, n * (per), array, err);
     STATE_NODES(PUT)
 #undef PUT
+    if (status == SILT_OK && run->nodes.eddy)
+        status = silt_store_put(store, "nodes/eddy", STORE_DOUBLE, n, run->nodes.eddy, err);
     if (status == SILT_OK)
         status = silt_store_put(store, "mesh/cell", STORE_INT, 4 * (size_t)run->mesh.n_cell, run->mesh.cell, err);
     if (status == SILT_OK)
@@ -56,6 +58,9 @@ silt_status silt_run_save(silt_run *run, const char *path, silt_error *err) {
         SILT_RESERVE(run->body_water, run->body_water_capacity, run->scene->n_body);
         status = silt_store_put(store, "bodies/water", STORE_BYTE, (size_t)run->scene->n_body * sizeof *run->body_water, run->body_water, err);
     }
+    if (status == SILT_OK && run->scene->n_body)
+        status = silt_store_put(store, "bodies/inertia", STORE_DOUBLE,
+                                run->body_inertia ? 36 * (size_t)run->scene->n_body * (size_t)run->scene->n_body : 0, run->body_inertia, err);
     if (status == SILT_OK)
         status = silt_gauges_save(run->gauges, store, err);
     if (status == SILT_OK && run->scene->fluid.air_pressure > 0)
@@ -101,6 +106,10 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
         SILT_TRY(silt_store_take(store, name, type, n * (per), array, err));
     STATE_NODES(TAKE)
 #undef TAKE
+    if (scene->fluid.on && silt_turbulence_model(scene) == TURBULENCE_SPALART_ALLMARAS) {
+        silt_nodes_eddies(&run->nodes);
+        SILT_TRY(silt_store_take(store, "nodes/eddy", STORE_DOUBLE, n, run->nodes.eddy, err));
+    }
     silt_walls_move(&run->walls, scene, run->time, 0);
     SILT_TRY(silt_store_count(store, "mesh/cell", &n_index, err));
     run->mesh.n_cell = (int)(n_index / 4);
@@ -118,6 +127,10 @@ silt_status silt_run_load(silt_run *run, silt_store *store, silt_error *err) {
         SILT_TRY(silt_store_take(store, "bodies/carry", STORE_DOUBLE, 6 * (size_t)scene->n_body, run->body_carry, err));
         SILT_RESERVE(run->body_water, run->body_water_capacity, scene->n_body);
         SILT_TRY(silt_store_take(store, "bodies/water", STORE_BYTE, (size_t)scene->n_body * sizeof *run->body_water, run->body_water, err));
+        SILT_TRY(silt_store_count(store, "bodies/inertia", &n_index, err));
+        if (n_index)
+            SILT_RESERVE(run->body_inertia, run->body_inertia_capacity, (int)n_index);
+        SILT_TRY(silt_store_take(store, "bodies/inertia", STORE_DOUBLE, n_index, run->body_inertia, err));
     }
     if (scene->bed.on)
         SILT_TRY(silt_bed_load(&run->bed, &run->walls, store, err));

@@ -9,6 +9,7 @@
 #define UPLIFT_SHUT 0.1  // of the local size: a mouth that is narrower lets no air through
 #define SLAVE (-3)       // in `place`: a node that has been listed
 #define UPLIFT_GAP 0.5   // of it: what is nearer to something solid has no air between
+#define UPLIFT_FLAT 0.02 // of its dim-th power, volume at a node of flat cells
 
 /** what is behind a piece of a body's surface */
 typedef enum { PIECE_AIR = 0, PIECE_WATER, PIECE_FILM } uplift_piece;
@@ -26,7 +27,7 @@ struct silt_uplift {
     int parent_capacity, sealed_capacity, volume_capacity;
     double *volume;   // owned, per body, m3 in its films as the step begins
     int *parent;      // owned, per node: pieces of water (silt_group_find)
-    uint8_t *sealed;  // owned, per piece: 1 films are all that it has besides what is shut, 2: and it stays so
+    uint8_t *sealed;  // owned, per piece: 1 films are all that it has besides what is shut, 2: and it stays so; then whatever is asked
     int *at;          // owned, node of each number that bodies' nodes were given, -1
     int *first, *list; // owned, pieces by their nodes
 };
@@ -456,6 +457,42 @@ static void mouths_shut(silt_uplift *u, silt_run *run) {
             mesh->surface[mesh->facet[f][a]] = 1;
 }
 
+// flat cells, of which nothing moves but as bodies and walls do
+static bool all_stuck(const silt_uplift *u, const silt_run *run, int i) {
+    const silt_nodes *nodes = &run->nodes;
+    const int D = run->mesh.dim;
+    double volume = 0;
+    for (int k = run->mesh.node_cell_start[i]; k < run->mesh.node_cell_start[i + 1]; k++)
+        volume += silt_cell_volume(&run->mesh, nodes->x, run->mesh.node_cell[k]) / (D + 1);
+    if (volume > UPLIFT_FLAT * pow(silt_node_h(nodes, i, run->scene->fluid.size), D))
+        return false;
+    for (int k = run->mesh.neighbour_start[i]; k < run->mesh.neighbour_start[i + 1]; k++) {
+        const int j = run->mesh.neighbour[k], kind = nodes->kind[j];
+        const bool sticks = kind == NODE_FLUID && nodes->wall[j][0] >= 0 &&
+                            run->scene->wall[run->walls.wall[nodes->wall[j][0]]].condition == WALL_NO_SLIP;
+        if (kind != NODE_BODY && kind != NODE_BED && kind != NODE_CORNER && u->place[j] != SLAVE && !sticks)
+            return false;
+    }
+    return true;
+}
+
+// What a film gives to a rim whose cells can go nowhere would have to go through them by a pressure that nothing bounds: 35 MPa under a cube
+// that lifts off. The film goes on past such cells, as long as it has another rim.
+static void rims_stuck(silt_uplift *u, const silt_run *run) {
+    silt_film *m = &u->film;
+    SILT_RESERVE(u->sealed, u->sealed_capacity, run->nodes.count + 1);
+    uint8_t *way = u->sealed; // per group: it has a rim
+    memset(way, 0, (size_t)run->nodes.count);
+    for (int pass = 0; pass < 2; pass++)
+        for (int k = 0; k < m->n_node; k++) {
+            const bool stuck = m->rim[k] == FILM_WET && all_stuck(u, run, m->node[k]);
+            if (pass == 0)
+                way[group_of(u, m->node[k])] |= m->rim[k] != FILM_INNER && !stuck;
+            else if (stuck && way[group_of(u, m->node[k])])
+                m->rim[k] = FILM_INNER;
+        }
+}
+
 // ---- what films hold
 
 static double node_gap(const silt_run *run, int i) {
@@ -633,6 +670,7 @@ silt_film *silt_uplift_find(silt_uplift **uplift, silt_run *run) {
     }
     films_group(u, run);
     mouths_shut(u, run);
+    rims_stuck(u, run);
     silt_film_ready(m, &run->mesh, nodes->x);
     return m->n_mouth || m->n_element ? m : NULL;
 }

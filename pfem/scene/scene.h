@@ -60,6 +60,12 @@ typedef struct silt_wall {
     double pivot[3];     // m, what `angle` turns about
 } silt_wall;
 
+/** eddies that are there at the start, or come in with water, of spalart-allmaras; both 0: three times the water's own viscosity */
+typedef struct silt_eddy_def {
+    double viscosity; // m2/s, the same everywhere
+    double shear;     // m/s, shear velocity u*: 0.41 u* d (1 - d/D), d the distance to the wall, D the depth
+} silt_eddy_def;
+
 /** what drives the water in: exactly one is given in a scene */
 typedef enum { INLET_VELOCITY = 1, INLET_HEAD } silt_inlet_drive;
 /** water fed in through the segment from-to (water on its left), in 3-D through a flat, convex polygon (counter-clockwise as the
@@ -72,6 +78,7 @@ typedef struct silt_inlet {
     double *corner;      // owned, 3 per point
     double velocity[3];  // m/s; multiplied by column 1 of the series when there is one
     silt_series series;  // n_row 0: constant; in the scene the name of a CSV file
+    silt_eddy_def eddy;  // of the water that comes in
     double grains;       // kg/s, 2-D per metre of width: sediment that comes in with the water; multiplied by the series too
     silt_series head;    // level over time (time, level), m, of still water behind it; n_row 0: velocity-driven
 } silt_inlet;
@@ -117,7 +124,14 @@ typedef struct silt_formula {
 
 /** how water flows in the small */
 typedef enum { FLOW_TURBULENT = 0, FLOW_LAMINAR } silt_flow;
-typedef enum { TURBULENCE_AUTO = 0, TURBULENCE_NONE, TURBULENCE_MIXING_LENGTH, TURBULENCE_SMAGORINSKY, TURBULENCE_WALE } silt_turbulence;
+typedef enum {
+    TURBULENCE_AUTO = 0,
+    TURBULENCE_NONE,
+    TURBULENCE_MIXING_LENGTH,
+    TURBULENCE_SMAGORINSKY,
+    TURBULENCE_WALE,
+    TURBULENCE_SPALART_ALLMARAS,
+} silt_turbulence;
 typedef enum { RHEOLOGY_NEWTONIAN = 0, RHEOLOGY_BINGHAM, RHEOLOGY_HERSCHEL_BULKLEY } silt_rheology;
 
 /** where nodes stand closer or farther than fluid.size */
@@ -141,6 +155,7 @@ typedef struct silt_fluid_def {
     silt_pressure_operator pressure; // pressure: consistent | laplacian
     silt_flow flow;             // flow: turbulent | laminar
     silt_turbulence turbulence; // auto: mixing-length in 2-D, wale in 3-D when the flow is turbulent, else none; replaced while reading
+    silt_eddy_def eddy;         // at the start
     double wall_height;  // 2, times h, where the wall law samples the velocity
     silt_rheology rheology;
     double yield_stress; // Pa, 0

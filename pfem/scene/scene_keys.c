@@ -6,7 +6,7 @@
 
 #define AT(type, field)           .offset = offsetof(type, field)
 #define MANY(type, number, field) .count = offsetof(type, number), .offset = offsetof(type, field)
-#define RANGE(from, to)           .low = from, .high = to
+#define RANGE(from, to)           .low = (from), .high = (to)
 #define POSITIVE                  .flags = KEY_OPEN_LOW, .low = 0, .high = HUGE_VAL
 #define NOT_NEGATIVE              .low = 0, .high = HUGE_VAL
 #define ONLY(kind)                (1u << (kind))
@@ -25,6 +25,7 @@ static const silt_word turbulence_words[] = {{"auto", TURBULENCE_AUTO},
                                              {"mixing-length", TURBULENCE_MIXING_LENGTH},
                                              {"smagorinsky", TURBULENCE_SMAGORINSKY},
                                              {"wale", TURBULENCE_WALE},
+                                             {"spalart-allmaras", TURBULENCE_SPALART_ALLMARAS},
                                              {0}};
 static const silt_word rheology_words[] = {{"newtonian", RHEOLOGY_NEWTONIAN},
                                            {"bingham", RHEOLOGY_BINGHAM},
@@ -176,6 +177,12 @@ TABLE(region, "a region", silt_region, offsetof(silt_region, kind));
 
 #define CORNERS \
     "of a flat, convex polygon, in a wall or in the open; counter-clockwise as the water in front of it sees them"
+#define EDDY_ROWS(type, where)                                                                                                               \
+    {"eddy_viscosity", KEY_NUMBER, .unit = "m2/s", .fallback = "0", NOT_NEGATIVE, AT(type, eddy.viscosity),                                \
+     .doc = "with turbulence: spalart-allmaras, of the water " where "; 0: by shear_velocity, or without it 3 viscosity/density"},         \
+    {"shear_velocity", KEY_NUMBER, .unit = "m/s", .fallback = "0", NOT_NEGATIVE, AT(type, eddy.shear),                                     \
+     .doc = "with turbulence: spalart-allmaras, of a log law " where ": eddy viscosity 0.41 u* d (1 - d/D), d the distance to the nearest wall, "\
+            "D the depth"}
 static const silt_key inlet_rows[] = {
     {"name", KEY_NAME, AT(silt_inlet, name), .doc = "different from all other inlets and outlets"},
     {"from", KEY_POINT, .unit = "m", .flags = KEY_PLANE, AT(silt_inlet, from),
@@ -192,6 +199,7 @@ static const silt_key inlet_rows[] = {
     {"grains", KEY_NUMBER, .unit = "kg/s", .fallback = "0", NOT_NEGATIVE, .when = ONLY(INLET_VELOCITY), AT(silt_inlet, grains),
      .doc = "sediment that comes in with the water (2-D: kg/s per m of width), times the factor of `series`: parcels of grains.parcel "
             "with bed.density, at random places of the inlet; needs a bed"},
+    EDDY_ROWS(silt_inlet, "that comes in"),
     {0}};
 TABLE(inlet, "an inlet", silt_inlet, offsetof(silt_inlet, drive));
 
@@ -284,7 +292,8 @@ static const silt_key fluid_rows[] = {
     {"flow", KEY_WORD, .fallback = "turbulent", .words = flow_words, AT(silt_fluid_def, flow),
      .doc = "decides the defaults of turbulence and of the walls' condition"},
     {"turbulence", KEY_WORD, .fallback = "auto", .words = turbulence_words, AT(silt_fluid_def, turbulence),
-     .doc = "model; auto: mixing-length in 2-D, wale in 3-D, none where the flow is laminar"},
+     .doc = "model; auto: mixing-length in 2-D, wale in 3-D, none where the flow is laminar; spalart-allmaras: eddies that the water carries"},
+    EDDY_ROWS(silt_fluid_def, "at the start"),
     {"wall_height", KEY_NUMBER, .unit = "h", .fallback = "2", .flags = KEY_OPEN_LOW, RANGE(0, 20),
      AT(silt_fluid_def, wall_height), .doc = "distance from the wall at which the wall law samples the velocity"},
     {"rheology", KEY_WORD, .fallback = "newtonian", .words = rheology_words, AT(silt_fluid_def, rheology),

@@ -360,6 +360,24 @@ static void settle_sizes(silt_reader *reader, const silt_scene *scene) {
     }
 }
 
+// eddies of the start or of an inlet (k >= 0) are carried by one model alone, and known by one number
+static void check_eddies(silt_reader *reader, const silt_fluid_def *fluid, int k) {
+    const silt_eddy_def *eddy = k < 0 ? &fluid->eddy : &fluid->inlet[k].eddy;
+    const char *const key[2] = {"eddy_viscosity", "shear_velocity"};
+    const double value[2] = {eddy->viscosity, eddy->shear};
+    char where[64] = "fluid";
+    if (k >= 0)
+        snprintf(where, sizeof where, "fluid.inlets.%d", k);
+    for (int q = 0; q < 2; q++)
+        if (value[q] > 0 && fluid->turbulence != TURBULENCE_SPALART_ALLMARAS)
+            silt_complain(reader, silt_tree_find(reader->root, "%s.%s", where, key[q]),
+                          "key '%s.%s': found %.10g with a model that carries no eddies, allowed with turbulence: spalart-allmaras", where, key[q],
+                          value[q]);
+    if (value[0] > 0 && value[1] > 0)
+        silt_complain(reader, silt_tree_find(reader->root, "%s.shear_velocity", where),
+                      "key '%s.shear_velocity': found %.10g beside an eddy_viscosity, allowed one of the two", where, value[1]);
+}
+
 static void settle_fluid(silt_reader *reader, silt_scene *scene) {
     silt_fluid_def *fluid = &scene->fluid;
     const silt_tree *node = silt_tree_item(reader->root, "fluid");
@@ -375,6 +393,8 @@ static void settle_fluid(silt_reader *reader, silt_scene *scene) {
         fluid->turbulence = laminar                 ? TURBULENCE_NONE
                             : scene->dimension == 3 ? TURBULENCE_WALE
                                                     : TURBULENCE_MIXING_LENGTH;
+    for (int k = -1; k < fluid->n_inlet; k++)
+        check_eddies(reader, fluid, k);
     // rheology
     if (fluid->rheology == RHEOLOGY_NEWTONIAN && fluid->yield_stress > 0)
         silt_complain(reader, silt_tree_item(node, "yield_stress"),

@@ -34,6 +34,9 @@ static int warn_fluid(const silt_scene *scene, FILE *to) {
               "a fluid with a yield stress and a turbulence model; mud mostly wants flow: laminar");
     warn_when(eddies && scene->dimension != 3, scene, to, &count,
               "fluid.turbulence is a model of three-dimensional eddies; in two dimensions mixing-length is meant");
+    warn_when(fluid->turbulence == TURBULENCE_SPALART_ALLMARAS && fluid->viscosity == 0 && fluid->eddy.viscosity == 0 && fluid->eddy.shear == 0, scene,
+              to, &count, "fluid.turbulence: spalart-allmaras makes eddies of eddies, and there are none at the start: water without viscosity "
+              "needs fluid.eddy_viscosity or fluid.shear_velocity");
     warn_when(n_pulled, scene, to, &count,
               "%d walls slip and have a velocity along themselves, which does not reach the water", n_pulled);
     warn_when(turbulent && scene->bed.on && scene->bed.condition == WALL_NO_SLIP && silt_bed_erodes(&scene->bed), scene, to,

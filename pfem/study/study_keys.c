@@ -6,7 +6,7 @@
 #define AT(type, field)           .offset = offsetof(type, field)
 #define MANY(type, number, field) .count = offsetof(type, number), .offset = offsetof(type, field)
 #define POSITIVE                  .flags = KEY_OPEN_LOW, .low = 0, .high = HUGE_VAL
-#define RANGE(from, to)           .low = from, .high = to
+#define RANGE(from, to)           .low = (from), .high = (to)
 #define DRAWN                     (1u << RANGE_LINEAR | 1u << RANGE_LOG | 1u << RANGE_RANDOM | 1u << RANGE_LOG_RANDOM)
 #define FORM                      "what the key becomes, with the value in the place of %, for example \"[0, -%]\""
 

@@ -11,16 +11,15 @@ static bool row_counts(const study_row *row) {
     return study_row_status(row) <= RUN_BEYOND;
 }
 
-// a title as gnuplot takes it in double quotes
+// text or a file's name in single quotes, in which gnuplot takes all but the quote as it is; in double ones it would run what stands in `
 static void plot_quote(FILE *to, const char *text) {
-    fputc('"', to);
+    fputc('\'', to);
     for (; *text; text++)
-        fprintf(to,
-                *text == '"' || *text == '\\'                                                  ? "\\%c"
-                : *text == '_' || *text == '^' || *text == '@' || *text == '{' || *text == '}' ? "\\\\%c"
-                                                                                               : "%c",
-                *text);
-    fputc('"', to);
+        if (*text == '\'')
+            fputs("''", to);
+        else
+            fputc(*text == '\n' ? ' ' : *text, to);
+    fputc('\'', to);
 }
 
 /** what a plot is drawn from */
@@ -33,8 +32,9 @@ static FILE *script_begin(const plot_files *files, const study *s, const study_p
     FILE *to = fopen(files->script, "w");
     if (!to)
         return NULL;
-    fprintf(to, "set terminal svg size 640,480 background 'white'\nset output '%s'\nset grid\nset title ",
-            files->picture);
+    fprintf(to, "set terminal svg size 640,480 noenhanced background 'white'\nset output ");
+    plot_quote(to, files->picture);
+    fprintf(to, "\nset grid\nset title ");
     char *title = silt_text("%s: %s", s->title && *s->title ? s->title : "study", plot->name);
     plot_quote(to, title);
     free(title);
@@ -98,10 +98,9 @@ static bool plot_time(const plot_files *files, const study *s, const study_plot 
     if (!to)
         return false;
     fprintf(to, "set logscale xy\nset format x '%%.2g'\nset format y '%%.2g'\nset key top right\n");
-    fprintf(
-        to,
-        "plot '%s' index 0 with points pt 7 title 'runs', '' index 1 with linespoints pt 6 lw 2 title 'Pareto front'\n",
-        files->data);
+    fprintf(to, "plot ");
+    plot_quote(to, files->data);
+    fprintf(to, " index 0 with points pt 7 title 'runs', '' index 1 with linespoints pt 6 lw 2 title 'Pareto front'\n");
     fclose(to);
     return true;
 }
@@ -123,7 +122,9 @@ static bool plot_line(const plot_files *files, const study *s, const study_plot 
         const int m = study_slope(table, x, y, plot->by, value, &slope, &at_one);
         if (m == 0)
             continue;
-        fprintf(to, "%s'%s' index %d with points pt 7 lc %d ", block ? ", " : "", files->data, block, block + 1);
+        fputs(block ? ", " : "", to);
+        plot_quote(to, files->data);
+        fprintf(to, " index %d with points pt 7 lc %d ", block, block + 1);
         char *title = plot->by ? silt_text("%s %s", plot->by, value) : silt_text("runs");
         fprintf(to, "title ");
         plot_quote(to, title);
@@ -193,8 +194,9 @@ static bool plot_map(const plot_files *files, const study *s, const study_plot *
     for (int k = 0; k < RUN_STATUS_COUNT; k++) {
         if (!found[k])
             continue;
-        fprintf(to, "%s'%s' index %d using 1:2:(0.45):(0.45) with boxxyerror lc '%s' title '%s'", any ? ", " : "",
-                files->data, k, colour[k], study_status_word[k]);
+        fputs(any ? ", " : "", to);
+        plot_quote(to, files->data);
+        fprintf(to, " index %d using 1:2:(0.45):(0.45) with boxxyerror lc '%s' title '%s'", k, colour[k], study_status_word[k]);
         any = true;
     }
     fputc('\n', to);
@@ -283,7 +285,6 @@ silt_status study_plots(const study *s, const char *out, const study_table *tabl
                                        {.kind = PLOT_MAP, .name = "map"}};
     const int n = s->n_plot ? s->n_plot : (int)(sizeof usual / sizeof *usual);
     (void)err;
-    // gnuplot takes file names as they are: it works in the folder of the results
     for (int i = 0; i < n; i++) {
         const study_plot *plot = s->n_plot ? &s->plot[i] : &usual[i];
         const char *missing = plot_one(s, out, table, plot, s->n_plot > 0);

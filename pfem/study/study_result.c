@@ -37,10 +37,9 @@ static bool frame_bad(const char *out, char text[64]) {
 static void log_reason(const char *log, char *reason, size_t size) {
     char *line = NULL;
     size_t capacity = 0;
-    ssize_t length;
     FILE *from = fopen(log, "r");
     *reason = 0;
-    while (from && (length = getline(&line, &capacity, from)) > 0) {
+    while (from && getline(&line, &capacity, from) > 0) {
         line[strcspn(line, "\n")] = 0;
         const bool warns = strncmp(line, "warning", 7) == 0 || strstr(line, ": warning: ");
         if (warns || !*line)

@@ -21,7 +21,7 @@
 
 // silt run SCENE -o OUT -q --threads N -D ...
 static char **child_words(const study *s, const silt_study_def *def, const char *out, int n_set, char *const *set) {
-    char **word = silt_alloc((size_t)(2 * n_set + 12), sizeof *word);
+    char **word = silt_alloc(2 * (size_t)n_set + 12, sizeof *word);
     int n = 0;
     word[n++] = silt_text("silt");
     word[n++] = silt_text("run");
