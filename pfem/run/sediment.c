@@ -14,7 +14,7 @@
 #define RELEASE_LONG 4      // radii: a parcel that had to look farther goes up through the heap on it
 #define RELEASE_FAR 12      // radii, the farthest that it looks
 #define RELEASE_LIFTS 0.5   // upward part of the normal above which seepage can lift grains off
-#define RELEASE_HANGS -0.3  // upward part of the normal out of the bed below which sand does not hold
+#define RELEASE_HANGS (-0.3) // upward part of the normal out of the bed below which sand does not hold
 
 static double gravity_of(const silt_scene *scene) {
     return hypot(hypot(scene->gravity[0], scene->gravity[1]), scene->gravity[2]);

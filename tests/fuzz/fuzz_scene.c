@@ -18,6 +18,11 @@ static void link_files(const char *from) {
         closedir(folder);
 }
 
+// libfyaml 0.7.12 keeps a list of its own with each quoted text of more than four escapes (its issue 233); that the reader gives back what
+// it had from there is seen by `scene` in a build with SILT_SANITIZE, which passes nothing over
+const char *__lsan_default_suppressions(void);
+const char *__lsan_default_suppressions(void) { return "leak:libfyaml\n"; }
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     silt_scene *scene = NULL, *again = NULL;
     silt_error err = {0};
