@@ -10,6 +10,7 @@
 
 #define LARGE ((size_t)1 << 18) // bytes of an array from which it is to lie on pages of 2 MB
 #define APART ((size_t)1 << 17) // bytes from which an array that lasts is kept out of the heap
+#define MANY 16384              // items
 #define HEAP_MOST (32 << 20)    // bytes up to which what is needed for a moment comes from the heap: new pages cost 0.4 ns a byte
 
 silt_status silt_fail(silt_error *err, silt_status status, const char *format, ...) {
@@ -78,11 +79,71 @@ void *silt_room(void *data, size_t *capacity, size_t need, size_t size) {
     return data;
 }
 
+// Lent memory: blocks one on the other, each behind a header that knows the one below. What is needed goes where it fits among those that
+// are free again, else on top.
+typedef struct header {
+    size_t below, bytes;
+    bool free;
+} header;
+#define HEADER ((size_t)64) // bytes, so that what follows begins on a line of the cache
+static _Thread_local struct {
+    char *data;
+    size_t bytes, used, last;
+} lent;
+
+void silt_lend(void *data, size_t bytes) {
+    const size_t skip = (HEADER - (uintptr_t)data % HEADER) % HEADER;
+    const bool any = data && bytes > skip;
+    lent.data = any ? (char *)data + skip : NULL;
+    lent.bytes = any ? bytes - skip : 0;
+    lent.used = lent.last = 0;
+}
+
+bool silt_borrowed(const void *data) {
+    const uintptr_t at = (uintptr_t)data, begin = (uintptr_t)lent.data;
+    return begin && at >= begin && at < begin + lent.bytes;
+}
+
+void *silt_borrow(size_t n, size_t size) {
+    size_t bytes;
+    if (__builtin_mul_overflow(n ? n : 1, size ? size : 1, &bytes) || bytes > lent.bytes)
+        return silt_alloc(n, size);
+    bytes = (bytes + HEADER - 1) / HEADER * HEADER;
+    size_t at = 0;
+    header *block = (header *)(void *)lent.data;
+    while (at < lent.used && !(block->free && block->bytes >= bytes)) {
+        at += HEADER + block->bytes;
+        block = (header *)(void *)(lent.data + at);
+    }
+    if (at + HEADER + bytes > lent.bytes)
+        return silt_alloc(n, size);
+    if (at == lent.used) {
+        *block = (header){.below = lent.last, .bytes = bytes};
+        lent.last = at;
+        lent.used += HEADER + bytes;
+    }
+    block->free = false;
+    return memset((char *)block + HEADER, 0, bytes);
+}
+
+void silt_return(void *data) {
+    if (!silt_borrowed(data)) {
+        free(data);
+        return;
+    }
+    ((header *)(void *)((char *)data - HEADER))->free = true;
+    for (const header *top; lent.used && (top = (const header *)(void *)(lent.data + lent.last))->free;) {
+        lent.used = lent.last;
+        lent.last = top->below;
+    }
+}
+
 void *silt_grow(void *data, int *capacity, int need, size_t size) {
     if (need <= *capacity)
         return data;
-    // half more than before, so that pushing one by one costs a constant each
-    int64_t wanted = (int64_t)*capacity + *capacity / 2 + 8;
+    // Half more than before, so that pushing one by one costs a constant each; of many an eighth, since room is memory. Not by the size of an item:
+    // arrays that share a capacity grow alike.
+    int64_t wanted = (int64_t)*capacity + *capacity / (*capacity < MANY ? 2 : 8) + 8;
     if (wanted < need)
         wanted = need;
     if (wanted > INT32_MAX)
@@ -90,16 +151,17 @@ void *silt_grow(void *data, int *capacity, int need, size_t size) {
     size_t bytes = 0;
     const size_t old = (size_t)*capacity * size;
     void *grown = NULL;
-    if (!__builtin_mul_overflow((size_t)wanted, size, &bytes))
-        grown = bytes >= APART ? apart(bytes) : realloc(data, bytes ? bytes : 1);
+    const bool fits = !__builtin_mul_overflow((size_t)wanted, size, &bytes), fresh = bytes >= APART || silt_borrowed(data);
+    if (fits)
+        grown = fresh ? apart(bytes) : realloc(data, bytes ? bytes : 1);
     if (!grown)
         memory_exhausted((size_t)wanted, size);
-    if (bytes < APART)
+    if (!fresh)
         memset((char *)grown + old, 0, bytes - old);
     else {
         if (old)
             memcpy(grown, data, old);
-        free(data);
+        silt_return(data);
     }
     *capacity = (int)wanted;
     return grown;

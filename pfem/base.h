@@ -34,6 +34,11 @@ void *silt_room(void *data, size_t *capacity, size_t need, size_t size);
 /** For a program that is silt's alone: arrays that last come from the system, so that they leave no holes in the heap (a tenth of the
  * peak), and the heap keeps what it has for what is needed for a moment. */
 void silt_memory_settle(void);
+/** Memory that rests lends itself to what is needed for a moment, until it is lent no more (NULL, 0); what it holds is lost. One thread's. */
+void silt_lend(void *data, size_t bytes);
+void *silt_borrow(size_t n, size_t size); /**< as silt_alloc, of lent memory as far as that goes; silt_grow may be used on it */
+void silt_return(void *data);             /**< for free(): gives back what was borrowed, frees what was not */
+bool silt_borrowed(const void *data);     /**< whether it lies in memory that is lent now */
 char *silt_text(const char *format, ...) __attribute__((format(printf, 1, 2))); /**< owned by the caller */
 
 /** SILT_RESERVE(p, cap, need): p grows to hold need items */

@@ -255,6 +255,8 @@ typedef struct silt_memory {
     } *exchange;          // owned
 } silt_memory;
 void silt_memory_clear(silt_memory *memory);
+/** Gives back what it has borrowed (silt_lend): cells, areas and places, until the next silt_memory_take */
+void silt_memory_rest(silt_memory *memory);
 /** Takes down the present mesh with its areas at positions x (before the cloud is edited). */
 void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nodes *nodes);
 /** Makes the memory's flags as long as the cloud is now. */

@@ -34,6 +34,46 @@ static const char *make_text(const char *name, const char *text) {
     return make(name, text, strlen(text));
 }
 
+// memory that is lent: what is borrowed lies in it as far as it goes, is nought, does not overlap, and is found free again
+static void test_lent(void **state) {
+    (void)state;
+    static char room[4096];
+    memset(room, 7, sizeof room);
+    int *before = silt_borrow(10, sizeof *before); // nothing is lent: the heap's
+    assert_false(silt_borrowed(before));
+    silt_return(before);
+    silt_lend(room + 5, sizeof room - 5);
+    char *block[3];
+    const size_t size[3] = {100, 1000, 300};
+    for (int k = 0; k < 3; k++) {
+        block[k] = silt_borrow(size[k], 1);
+        assert_true(silt_borrowed(block[k]) && block[k] > room && block[k] + size[k] <= room + sizeof room);
+        for (size_t c = 0; c < size[k]; c++)
+            assert_int_equal(block[k][c], 0);
+        memset(block[k], k + 1, size[k]);
+    }
+    for (int k = 0; k < 3; k++)
+        for (size_t c = 0; c < size[k]; c++)
+            assert_int_equal(block[k][c], k + 1);
+    char *large = silt_borrow(3000, 1); // more than is left
+    assert_false(silt_borrowed(large));
+    silt_return(large);
+    silt_return(block[1]); // between the others: the next that fits goes there
+    char *again = silt_borrow(900, 1);
+    assert_true(again == block[1] && again[0] == 0 && again[899] == 0 && block[0][99] == 1 && block[2][0] == 3);
+    // what grows leaves
+    int capacity = 100;
+    block[0] = silt_grow(block[0], &capacity, 101, 1);
+    assert_true(!silt_borrowed(block[0]) && capacity > 100 && block[0][99] == 1 && block[0][100] == 0);
+    free(block[0]);
+    silt_return(block[2]);
+    silt_return(again);
+    large = silt_borrow(3900, 1); // all is free again
+    assert_true(silt_borrowed(large));
+    silt_lend(NULL, 0);
+    assert_false(silt_borrowed(large));
+}
+
 // the shop floor -----------------------------------------------------------------------------------------
 static void test_base(void **state) {
     (void)state;
@@ -238,6 +278,7 @@ int main(void) {
         return 1;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_base),
+        cmocka_unit_test(test_lent),
         cmocka_unit_test(test_series),
         cmocka_unit_test(test_regions),
         cmocka_unit_test(test_formulas),

@@ -174,7 +174,7 @@ static void panels_apart(const silt_front *f) {
         const struct block *last = &f->block[f->branch[k].end - 1];
         const int own = last->end - last->begin, wide = own + last->row_end - last->row_begin;
         assert_int_equal(f->branch[k].end, f->branch[k + 1].begin);
-        assert_true(f->block[f->branch[k + 1].begin].value >= last->value + (size_t)own * (size_t)wide + DENSE_PAD);
+        assert_true(f->block[f->branch[k + 1].begin].value >= last->value + silt_dense_size(wide, last->negative, own) + DENSE_PAD);
     }
 }
 
@@ -472,6 +472,8 @@ static void dense(void **state) {
         for (int wide = own; wide < own + 40; wide += 3) {
             const int rest = wide - own, negative = wide % 2 ? own / 3 : 0; // columns of these
             double full[70][70], l[70][70] = {{0}};
+            // what is past the end stays as it was
+            assert_true(silt_dense_size(wide, negative, own) <= (size_t)(wide * own) && silt_dense_size(rest, 0, rest) <= (size_t)(rest * rest));
             float panel[70 * 70 + DENSE_PAD] = {0}, update[70 * 70 + DENSE_PAD] = {0}, whole[70 + DENSE_PAD];
             for (int i = 0; i < wide; i++)
                 for (int j = 0; j <= i; j++)
@@ -482,18 +484,19 @@ static void dense(void **state) {
                 whole[i] = (float)wide;
             for (int j = 0; j < own; j++)
                 for (int i = j; i < wide; i++)
-                    panel[i + j * wide] = (float)full[i][j];
+                    panel[i + silt_dense_column(wide, negative, j)] = (float)full[i][j];
             for (int j = 0; j < rest; j++)
                 for (int i = j; i < rest; i++)
-                    update[i + j * rest] = (float)full[own + i][own + j];
+                    update[i + silt_dense_column(rest, 0, j)] = (float)full[own + i][own + j];
             assert_int_equal(silt_dense_factor(own, negative, wide, whole, panel), -1);
             silt_dense_update(own, negative, wide, panel, update);
+            assert_true(panel[silt_dense_size(wide, negative, own)] == 0 && update[silt_dense_size(rest, 0, rest)] == 0);
             for (int j = 0; j < own; j++)
                 for (int i = j; i < wide; i++)
-                    l[i][j] = i == j ? 1 / panel[i + j * wide] : panel[i + j * wide];
+                    l[i][j] = i == j ? 1 / panel[i + silt_dense_column(wide, negative, j)] : panel[i + silt_dense_column(wide, negative, j)];
             for (int i = 0; i < wide; i++)
                 for (int j = 0; j <= i; j++) {
-                    double sum = i >= own && j >= own ? update[(i - own) + (j - own) * rest] : 0;
+                    double sum = i >= own && j >= own ? update[i - own + silt_dense_column(rest, 0, j - own)] : 0;
                     for (int c = 0; c < own; c++)
                         sum += (c < own - negative ? 1 : -1) * l[i][c] * l[j][c];
                     assert_true(fabs(sum - full[i][j]) < 4 * ROUNDED * wide);
@@ -502,7 +505,7 @@ static void dense(void **state) {
             float t[70 + DENSE_PAD] = {0}, y[70 + DENSE_PAD] = {0};
             for (int i = 0; i < wide; i++)
                 t[i] = y[i] = (float)silt_uniform(&seed);
-            silt_dense_forward(own, wide, panel, t);
+            silt_dense_forward(own, negative, wide, panel, t);
             for (int i = 0; i < wide; i++) {
                 double sum = i < own ? 0 : t[i];
                 for (int c = 0; c < own && c <= i; c++)
@@ -510,7 +513,7 @@ static void dense(void **state) {
                 assert_true(fabs(sum - y[i]) < 4 * ROUNDED * wide);
             }
             memcpy(y, t, sizeof y);
-            silt_dense_backward(own, wide, panel, t);
+            silt_dense_backward(own, negative, wide, panel, t);
             for (int j = 0; j < own; j++) {
                 double sum = 0;
                 for (int i = j; i < wide; i++)

@@ -254,9 +254,6 @@ static void test_water_and_grain_together(void **unused) {
     silt_nodes_clear(&run.nodes);
     silt_walls_clear(&run.walls);
     free(run.x_old);
-    free(run.wall_before);
-    free(run.v_before);
-    free(run.debt_before);
     free(run.map);
     silt_scene_free(&scene);
 }

@@ -122,6 +122,42 @@ static void test_lifted(void **state) {
     inertia_holds(PLANE OPEN BLOCK("at: [0.5, 0.105]"), 3, 0.02);
 }
 
+// 1 mm over the floor, with water from the left that three flat cells join to the film: its rim there is a node of theirs that can go nowhere. The
+// film goes on past it, to the right's.
+static void test_flat_rim(void **state) {
+    (void)state;
+    silt_run run;
+    silt_scene *scene;
+    begin(&run, &scene, PLANE OPEN BLOCK("at: [0.5, 0.101], velocity: [0, 0.05]"));
+    silt_nodes *nodes = &run.nodes;
+    int floor = 0, below[5], beside[2]; // the block's lower nodes, from left to right
+    while (nodes->kind[floor] != NODE_FLUID || nodes->wall[floor][0] < 0 || nodes->x[2 * floor + 1] != 0 || nodes->x[2 * floor] < 0.1)
+        floor++;
+    for (int i = 0; i < nodes->count; i++)
+        if (nodes->kind[i] == NODE_BODY && nodes->x[2 * i + 1] < 0.002)
+            below[(int)round((nodes->x[2 * i] - 0.4) / 0.05)] = i;
+    for (int k = 0; k < 2; k++) {
+        beside[k] = silt_nodes_add(nodes, NODE_FLUID, -1, (double[]){0.425 + 0.1 * k, 0});
+        memcpy(nodes->wall[beside[k]], nodes->wall[floor], sizeof *nodes->wall);
+    }
+    const int cell[4][4] = {{beside[0], below[1], below[0], -1}, {beside[0], beside[1], below[1], -1}, {beside[1], below[2], below[1], -1}, {beside[1], below[3], below[2], -1}};
+    SILT_RESERVE(run.mesh.cell, run.mesh.cell_capacity, run.mesh.n_cell + 4);
+    memcpy(run.mesh.cell + run.mesh.n_cell, cell, sizeof cell);
+    run.mesh.n_cell += 4;
+    silt_mesh_connect(&run.mesh, nodes);
+    water(&run);
+    // what the block draws in as it rises comes from the right alone: 0.05 m2/s over the last edge
+    assert_int_equal(run.film->n_node, 2);
+    silt_film_squeeze(run.film, 2, run.body_velocity, NULL);
+    for (int k = 0; k < 2; k++) {
+        const bool right = run.film->node[k] == below[4];
+        assert_true(right || run.film->node[k] == below[3]);
+        assert_int_equal(run.film->rim[k], right ? FILM_WET : FILM_INNER);
+        near(run.film->squeezed[k], right ? -0.05 * 0.05 : 0, 1e-12, "drawn in");
+    }
+    end(&run, &scene);
+}
+
 // turned by 3 degrees on its left lower edge: 0.1 (cos 3 + sin 3)
 static void test_tilted(void **state) {
     (void)state;
@@ -161,7 +197,7 @@ static void test_clip(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_flat), cmocka_unit_test(test_lifted), cmocka_unit_test(test_tilted),
+        cmocka_unit_test(test_flat), cmocka_unit_test(test_lifted), cmocka_unit_test(test_tilted), cmocka_unit_test(test_flat_rim),
         cmocka_unit_test(test_lid),  cmocka_unit_test(test_space),  cmocka_unit_test(test_clip),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

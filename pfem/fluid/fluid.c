@@ -1,6 +1,7 @@
 // one step of the water: FIC-stabilised P1-P1, updated Lagrangian, all integrals on the midpoint mesh (docs/method.md)
 #include "fluid.h"
 
+#define FLUID_WORK 6        // arrays in silt_fluid.work
 #define FLUID_STIFF 0.3     // mu dt/(rho h^2) from which viscosity has its say in the pressure correction
 #define FLUID_WHOLE 2.5     // the same, in the mean, from which momentum and continuity are factored as one
 #define FLUID_SLOW 12        // passes after which stiff cells, few as they are, bring that too
@@ -20,9 +21,8 @@
 void silt_fluid_clear(silt_fluid *f) {
     double *owned[] = {f->x_mid, f->flux, f->cell_volume, f->start, f->inverse, f->mu, f->tau, f->share, f->stand, f->potential, f->belt, f->wall_force, f->shift,
                        f->blow, f->level_force, f->bed_force, f->ride, f->level_brake, f->mass, f->volume,
-                       f->friction, f->inertia, f->w, f->star, f->force, f->reaction, f->scratch, f->excess, f->projection,
-                       f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->pressure_new, f->v_start, f->v_first, f->debt_first, f->normal, f->given, f->cg[0],
-                       f->cg[1]};
+                       f->friction, f->inertia, f->w, f->work, f->reaction, f->scratch,
+                       f->projection_weight, f->residual, f->rate, f->increment, f->withheld, f->pressure_new, f->v_start, f->v_first, f->debt_first, f->normal, f->given};
     for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
         free(owned[k]);
     free(f->piece);
@@ -42,6 +42,8 @@ void silt_fluid_clear(silt_fluid *f) {
     *f = (silt_fluid){0};
 }
 
+void *silt_fluid_rest(silt_fluid *f, size_t *bytes) { return silt_pressure_rest(f->pressure, bytes); }
+
 static void fluid_reserve(silt_fluid *f, const silt_step *s) {
     const int D = silt_nodes_dim(s->nodes), n_node = s->nodes->count, n_cell = s->mesh->n_cell;
     f->dim = D;
@@ -51,19 +53,17 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         f->field = silt_grow(f->field, &have, (need) * (per), sizeof *f->field);                                       \
     } while (0)
     if (n_node > f->node_capacity) {
-        const int need = n_node + n_node / 8 + 64, have_nodes = f->node_capacity;
+        const int need = n_node + n_node / 32 + 64, have_nodes = f->node_capacity;
         ROOM(x_mid, D, have_nodes, need);
         ROOM(w, D, have_nodes, need);
-        ROOM(star, D, have_nodes, need);
-        ROOM(force, D, have_nodes, need);
         ROOM(reaction, D, have_nodes, need);
         ROOM(scratch, D, have_nodes, need);
-        ROOM(excess, D, have_nodes, need);
-        ROOM(projection, D, have_nodes, need);
         ROOM(normal, D, have_nodes, need);
         ROOM(given, D, have_nodes, need);
-        for (int k = 0; k < 2; k++)
-            ROOM(cg[k], D, have_nodes, need);
+        ROOM(work, FLUID_WORK * D, have_nodes, need);
+        double **const lie[FLUID_WORK] = {&f->star, &f->force, &f->excess, &f->projection, &f->cg[0], &f->cg[1]};
+        for (int k = 0; k < FLUID_WORK; k++)
+            *lie[k] = f->work + (size_t)(k * D) * (size_t)need;
         f->cg[2] = f->reaction; // found when all is solved
         ROOM(v_start, D, have_nodes, need);
         ROOM(pressure_new, 1, have_nodes, need);
@@ -81,7 +81,7 @@ static void fluid_reserve(silt_fluid *f, const silt_step *s) {
         f->node_capacity = need;
     }
     if (n_cell > f->cell_capacity) {
-        const int need = n_cell + n_cell / 8 + 64, have_cells = f->cell_capacity;
+        const int need = n_cell + n_cell / 32 + 64, have_cells = f->cell_capacity;
         ROOM(flux, (D + 1) * D, have_cells, need);
         ROOM(cell_volume, 1, have_cells, need);
         ROOM(start, 1, have_cells, need);
@@ -494,6 +494,14 @@ static silt_status step_kind(silt_fluid *f, const silt_step *s, double *p, silt_
     return SILT_OK;
 }
 
+// What the fronts wait on lies in arrays that are written after it: 66 bytes a node of the peak at 40k nodes.
+static silt_status factor_pressure(silt_fluid *f, const silt_step *s, silt_error *err) {
+    silt_lend(f->work, (size_t)(FLUID_WORK * f->dim) * (size_t)f->node_capacity * sizeof *f->work);
+    const silt_status status = silt_pressure_factor(f->pressure, f, s, err);
+    silt_lend(NULL, 0);
+    return status;
+}
+
 static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, bool again, silt_error *err) {
     const silt_fluid_def *def = &s->scene->fluid;
     const bool consistent = def->pressure == PRESSURE_CONSISTENT;
@@ -520,7 +528,7 @@ static silt_status fluid_iterate(silt_fluid *f, const silt_step *s, double *p, b
             whole = direct && mean_stiffness(f, s) > FLUID_WHOLE;
             split = !direct && stiffness(f, s) > FLUID_STIFF;
             if (!again)
-                SILT_CLOCKED(matrix, status = silt_pressure_factor(f->pressure, f, s, err));
+                SILT_CLOCKED(matrix, status = factor_pressure(f, s, err));
             else
                 status = SILT_OK;
             SILT_TRY(status);

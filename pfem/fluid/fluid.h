@@ -64,9 +64,11 @@ typedef struct silt_fluid {
     double *friction;     // owned, per node, kg/s, wall law: traction over speed, times the wall's measure
     double *inertia;      // owned, per node, mass / (theta dt) + drag coefficient + friction
     double *w;            // owned, dim per node, the step's velocity: positions move with it
-    double *star, *force, *reaction, *scratch; // owned, dim per node; reaction: force of walls, bed, bodies on the water, N
-    double *excess;       // owned, dim per node, N, force that turns the lumped mass towards the consistent one
-    double *projection, *projection_weight;    // owned, pressure gradient projection (dim per node) and its weight
+    double *work;         // owned, what star, force, excess, projection and two of cg lie in: while the pressure is factored it is free
+    double *star, *force; // dim per node
+    double *reaction, *scratch; // owned, dim per node; reaction: force of walls, bed, bodies on the water, N
+    double *excess;       // dim per node, N, force that turns the lumped mass towards the consistent one
+    double *projection, *projection_weight;    // pressure gradient projection (dim per node) and its weight, owned
     double *residual, *rate, *increment;       // owned, 1 per node
     uint8_t *hold;        // owned, silt_hold
     uint8_t *mobile;      // owned, 1: some neighbour or the node itself can move; 2: but not so that its volume is kept; MOBILE_SPRAY
@@ -74,7 +76,7 @@ typedef struct silt_fluid {
     double *normal;       // owned, dim per node: silt_walls_hold's vector
     double *given;        // owned, dim per node, velocity of what is held
     silt_wall_normals wall_normals; // owned, of nodes on bent walls
-    double *cg[3];        // dim per node, working space of the momentum solver and others: two owned, the third lies in reaction
+    double *cg[3];        // dim per node, working space of the momentum solver and others; the third lies in reaction
     double *pressure_new, *v_start; // owned, 1 and dim per node: kept apart until the step is accepted
     double *v_first, *debt_first; // owned, dim and 1 per node: what the step began with once debts had spread and v was free of divergence; NULL without bodies
     double given_first;   // m3
@@ -128,6 +130,9 @@ static inline double silt_mesh_velocity(const silt_fluid *f, int k) {
         return f->ride ? f->ride[k] : 0;
     return f->w[k] + (f->shift ? f->shift[k] : 0) - (f->belt ? f->belt[k] : 0);
 }
+
+/** memory that is of no use until the next step, NULL: none (silt_lend) */
+void *silt_fluid_rest(silt_fluid *fluid, size_t *bytes);
 
 // hold.c -------------------------------------------------------------------------------------------------
 /** which velocity components the surroundings hold, and at what velocity */
@@ -255,6 +260,7 @@ silt_status silt_pressure_solve(silt_pressure *pressure, silt_fluid *fluid, cons
                                 double *increment, silt_error *err);
 /** increment = (3/(4 mu) M + L)^-1 right: the pressure's operator where viscosity outweighs inertia */
 silt_status silt_pressure_solve_stiff(silt_pressure *pressure, const double *right, double *increment, silt_error *err);
+void *silt_pressure_rest(silt_pressure *pressure, size_t *bytes); // silt_fluid_rest
 /** forgets factors, so that a resumed run and one that went on hold the same */
 void silt_pressure_forget(silt_pressure *pressure);
 

@@ -75,12 +75,12 @@ static void extend_add(const silt_front *f, struct worker *w, const struct block
 static void columns_clear(const silt_front *f, struct worker *w, const struct block *b, float *panel, float *update) {
     const int own = b->end - b->begin, rest = b->row_end - b->row_begin, wide = own + rest;
     for (int c = 0; c < own; c++) {
-        w->column[c] = panel + (size_t)c * (size_t)wide;
+        w->column[c] = panel + silt_dense_column(wide, b->negative, c);
         w->local[b->begin + c] = c;
         memset(w->column[c] + c, 0, (size_t)(wide - c) * sizeof *panel);
     }
     for (int c = 0; c < rest; c++) {
-        w->column[own + c] = update + (size_t)c * (size_t)rest - own;
+        w->column[own + c] = update + silt_dense_column(rest, 0, c) - own;
         w->local[f->row[b->row_begin + c]] = own + c;
         memset(w->column[own + c] + own + c, 0, (size_t)(rest - c) * sizeof *update);
     }
@@ -94,6 +94,19 @@ static struct branch *branch_of(silt_front *f, int last) {
     return &f->branch[k];
 }
 
+// Room for a moment, lent where one thread alone works: another one would not know that it is.
+static float *moment_take(const silt_front *f, size_t n) {
+    return f->n_worker == 1 ? silt_borrow(n + DENSE_PAD, sizeof(float)) : silt_alloc(n + DENSE_PAD, sizeof(float));
+}
+
+static void moment_give(const silt_front *f, float **data) {
+    if (f->n_worker == 1)
+        silt_return(*data);
+    else
+        free(*data);
+    *data = NULL;
+}
+
 // what the children of a node of the top have left for it. @return -1, or a node where one of them failed
 static int children_add(silt_front *f, struct worker *w, const struct branch *t) {
     int child = t->end - 2, bad = -1;
@@ -103,8 +116,7 @@ static int children_add(silt_front *f, struct worker *w, const struct branch *t)
             extend_add(f, w, &f->block[child], other->update);
         else
             bad = other->bad;
-        free(other->update);
-        other->update = NULL;
+        moment_give(f, &other->update);
         child = f->block[child].first - 1;
     }
     return bad;
@@ -115,9 +127,8 @@ static void branch_factor(silt_front *f, struct worker *w, const silt_front_matr
     int n_waiting = 0;
     float *top[2] = {w->stack[0], w->stack[1]};
     const struct block *last = &f->block[t->end - 1];
-    const size_t rest = (size_t)(last->row_end - last->row_begin);
     t->bad = -1;
-    t->update = silt_alloc(rest * rest + DENSE_PAD, sizeof(float));
+    t->update = moment_take(f, silt_front_update(last));
     for (int e = t->begin; e < t->end && t->bad < 0; e++) {
         const struct block *b = &f->block[e];
         const int own = b->end - b->begin, wide = own + b->row_end - b->row_begin;
@@ -131,8 +142,7 @@ static void branch_factor(silt_front *f, struct worker *w, const silt_front_matr
             t->bad = children_add(f, w, t);
         for (int c = 0; c < b->n_child && !t->top; c++) {
             const struct block *child = &f->block[w->waiting[--n_waiting]];
-            const size_t size = (size_t)(child->row_end - child->row_begin);
-            top[!b->side] -= size * size;
+            top[!b->side] -= silt_front_update(child);
             extend_add(f, w, child, top[!b->side]);
         }
         const int bad = t->bad < 0 ? silt_dense_factor(own, b->negative, wide, f->whole + b->begin, panel) : -1;
@@ -141,7 +151,7 @@ static void branch_factor(silt_front *f, struct worker *w, const silt_front_matr
         if (t->bad >= 0)
             return;
         silt_dense_update(own, b->negative, wide, panel, update);
-        top[b->side] += (size_t)(wide - own) * (size_t)(wide - own);
+        top[b->side] += silt_front_update(b);
         w->waiting[n_waiting++] = e;
     }
 }
@@ -223,7 +233,7 @@ static void workers_make(silt_front *f, int most) {
         SILT_RESERVE(w->run, w->run_capacity, f->widest + 1);
         SILT_RESERVE(w->part_right, w->part_capacity, f->widest + DENSE_PAD);
         for (int side = 0; side < 2; side++)
-            w->stack[side] = silt_alloc(f->stacked[side] + DENSE_PAD, sizeof(float));
+            w->stack[side] = moment_take(f, f->stacked[side]);
     }
 }
 
@@ -233,15 +243,12 @@ int silt_front_factor(silt_front *f, const silt_front_matrix *q) {
     workers_make(f, q->threads);
     pass_run(&(pass){.f = f, .q = q, .after = factor_after});
     for (int k = 0; k < f->n_worker; k++)
-        for (int side = 0; side < 2; side++) {
-            free(f->worker[k].stack[side]);
-            f->worker[k].stack[side] = NULL;
-        }
+        for (int side = 0; side < 2; side++)
+            moment_give(f, &f->worker[k].stack[side]);
     int bad = -1;
     for (int k = f->n_branch - 1; k >= 0; k--) {
         bad = f->branch[k].bad >= 0 ? f->branch[k].bad : bad;
-        free(f->branch[k].update);
-        f->branch[k].update = NULL;
+        moment_give(f, &f->branch[k].update);
     }
     return bad;
 }
@@ -278,7 +285,7 @@ static void forward_after(const pass *p, struct worker *w, struct branch *t) {
         const struct block *b = &f->block[e];
         const int own = b->end - b->begin, rest = b->row_end - b->row_begin;
         part_take(f, b, y, part);
-        silt_dense_forward(own, own + rest, f->value + b->value, part);
+        silt_dense_forward(own, b->negative, own + rest, f->value + b->value, part);
         memcpy(y + b->begin, part, (size_t)own * sizeof *part);
         for (int r = b->end - b->negative; r < b->end; r++)
             y[r] = -y[r]; // between L and L^T stand the signs of the pivots
@@ -298,7 +305,7 @@ static void backward_before(const pass *p, struct worker *w, struct branch *t) {
         const struct block *b = &f->block[e];
         const int own = b->end - b->begin, rest = b->row_end - b->row_begin;
         part_take(f, b, y, w->part_right);
-        silt_dense_backward(own, own + rest, f->value + b->value, w->part_right);
+        silt_dense_backward(own, b->negative, own + rest, f->value + b->value, w->part_right);
         memcpy(y + b->begin, w->part_right, (size_t)own * sizeof *y);
     }
     for (int k = f->block[t->begin].begin; k < f->block[t->end - 1].end; k++)
@@ -314,6 +321,11 @@ void silt_front_solve(silt_front *f, const double *right, double *out) {
     p.after = NULL;
     p.before = backward_before;
     pass_run(&p);
+}
+
+void *silt_front_rest(silt_front *f, size_t *bytes) {
+    *bytes = f ? f->n_value * sizeof *f->value : 0;
+    return f ? f->value : NULL;
 }
 
 void silt_front_free(silt_front **front) {

@@ -35,6 +35,8 @@ void silt_front_order(silt_front **front, const silt_front_matrix *matrix, const
 int silt_front_factor(silt_front *front, const silt_front_matrix *matrix);
 /** out = matrix^-1 right, which may be the same array, as far as single precision goes */
 void silt_front_solve(silt_front *front, const double *right, double *out);
+/** the factor's own memory, for other use until silt_front_factor; NULL: none */
+void *silt_front_rest(silt_front *front, size_t *bytes);
 void silt_front_free(silt_front **front);
 
 // front_mend.c: how good that is, and better ---------------------------------------------------------------

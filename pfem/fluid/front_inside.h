@@ -28,6 +28,12 @@ struct block {
     size_t value;    // of the panel (end - begin columns of own and row_end - row_begin entries)
 };
 
+/** numbers of a block's update */
+static inline size_t silt_front_update(const struct block *b) {
+    const int rest = b->row_end - b->row_begin;
+    return silt_dense_size(rest, 0, rest);
+}
+
 /** A node of the tree's top, or a subtree that one thread does. Its last block's update waits here for its parent. */
 struct branch {
     int begin, end;  // blocks; of the top: one
@@ -62,6 +68,7 @@ struct silt_front {
     int *local;             // the first worker's; in the dissection: part
     struct item *item;      // owned, while the order is looked for
     float *value;           // owned, panels, columns one after the other, 1/diagonal in the diagonal's place
+    size_t n_value;
     float *whole;           // owned, in the order of elimination: the matrix's diagonal
     float *right;           // owned, in the order of elimination
     int n_branch;

@@ -285,12 +285,10 @@ static void branch_stacks(silt_front *f, const struct branch *t, int *waiting) {
     for (int e = t->begin; e < t->end - 1; e++) {
         const struct block *b = &f->block[e];
         for (int c = 0; c < b->n_child; c++) {
-            const struct block *child = &f->block[waiting[--n_waiting]];
-            const size_t size = (size_t)(child->row_end - child->row_begin);
-            stacked[!b->side] -= size * size;
+            stacked[!b->side] -= silt_front_update(&f->block[waiting[--n_waiting]]);
         }
         waiting[n_waiting++] = e;
-        stacked[b->side] += (size_t)(b->row_end - b->row_begin) * (size_t)(b->row_end - b->row_begin);
+        stacked[b->side] += silt_front_update(b);
         f->stacked[b->side] = stacked[b->side] > f->stacked[b->side] ? stacked[b->side] : f->stacked[b->side];
     }
 }
@@ -324,7 +322,7 @@ static size_t panels_place(silt_front *f) {
         for (int e = f->branch[k].begin; e < f->branch[k].end; e++) {
             struct block *b = &f->block[e];
             b->value = value;
-            value += (size_t)(b->end - b->begin) * (size_t)(b->end - b->begin + b->row_end - b->row_begin);
+            value += silt_dense_size(b->end - b->begin + b->row_end - b->row_begin, b->negative, b->end - b->begin);
         }
         value += DENSE_PAD;
     }
@@ -371,5 +369,6 @@ void silt_front_order(silt_front **front, const silt_front_matrix *q, const doub
         unknowns_expand(f, n, unknowns);
     work_count(f);
     branches_find(f);
-    f->value = silt_room(f->value, &f->value_capacity, panels_place(f) + DENSE_PAD, sizeof(float));
+    f->n_value = panels_place(f) + DENSE_PAD;
+    f->value = silt_room(f->value, &f->value_capacity, f->n_value, sizeof(float));
 }

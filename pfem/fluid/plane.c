@@ -118,6 +118,8 @@ silt_status silt_plane_solve(silt_plane *p, silt_fluid *f, const double *right, 
     return silt_fail(err, SILT_FAILED, "the pressure system could not be solved (%d nodes)", p->matrix.n);
 }
 
+void *silt_plane_rest(silt_plane *p, size_t *bytes) { return p ? silt_front_rest(p->front, bytes) : NULL; }
+
 void silt_plane_forget(silt_plane *p) {
     if (p)
         p->revision = -1;

@@ -13,6 +13,8 @@ typedef struct silt_plane silt_plane;
 silt_status silt_plane_factor(silt_plane **plane, const silt_fluid *fluid, const silt_step *step, const uint8_t *pinned, silt_error *err);
 /** to `tolerance` relative to the right side; the fluid lends working space and counts the iterations beyond one solve with the factor */
 silt_status silt_plane_solve(silt_plane *plane, silt_fluid *fluid, const double *right, double tolerance, double *out, silt_error *err);
+/** silt_front_rest */
+void *silt_plane_rest(silt_plane *plane, size_t *bytes);
 /** the next factor has an order of its own */
 void silt_plane_forget(silt_plane *plane);
 void silt_plane_free(silt_plane **plane);

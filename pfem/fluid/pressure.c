@@ -30,6 +30,11 @@ void silt_pressure_forget(silt_pressure *pressure) {
     pressure->main.revision = pressure->stiff.revision = -1;
 }
 
+void *silt_pressure_rest(silt_pressure *pressure, size_t *bytes) {
+    *bytes = 0;
+    return pressure && pressure->in_plane ? silt_plane_rest(pressure->plane, bytes) : NULL;
+}
+
 void silt_pressure_free(silt_pressure **pressure) {
     if (!*pressure)
         return;

@@ -70,8 +70,8 @@ static void facet_join(book *b, const int c[4]) {
 
 static void book_facets(book *b) {
     const int n_node = b->nodes->count;
-    int *start = silt_alloc((size_t)n_node + 1, sizeof *start);
-    facet_item *item = silt_alloc((size_t)b->n_changed * (size_t)(b->dim + 1) + 1, sizeof *item);
+    int *start = silt_borrow((size_t)n_node + 1, sizeof *start);
+    facet_item *item = silt_borrow((size_t)b->n_changed * (size_t)(b->dim + 1) + 1, sizeof *item);
     for (int pass = 0; pass < 2; pass++) {
         for (int k = 0; k < b->n_changed; k++) {
             // without its first node the cell's rising nodes are a facet on one side, without its second on the other,
@@ -117,8 +117,8 @@ static void book_facets(book *b) {
             if (n > 1)
                 facet_join(b, c);
         }
-    free(start);
-    free(item);
+    silt_return(start);
+    silt_return(item);
 }
 
 // ---- nodes that were moved since the memory was taken
@@ -277,8 +277,8 @@ static void book_groups(book *b) {
     const int n = b->nodes->count, n_corner = b->dim + 1, n_element = b->n_changed + n;
     silt_memory *memory = b->memory;
     // items and lone nodes by group
-    int *start = silt_alloc((size_t)n_element + 2, sizeof *start),
-        *order = silt_alloc((size_t)b->n_item + (size_t)n + 1, sizeof *order);
+    int *start = silt_borrow((size_t)n_element + 2, sizeof *start),
+        *order = silt_borrow((size_t)b->n_item + (size_t)n + 1, sizeof *order);
     for (int pass = 0; pass < 2; pass++) {
         for (int k = b->n_item + n - 1; k >= 0; k--) {
             // a node's debt must find its group also where it has no changed cell
@@ -298,7 +298,7 @@ static void book_groups(book *b) {
             start[g] = sum;
         }
     }
-    int *seen = silt_alloc((size_t)n + 1, sizeof *seen); // 1 + the node's place in the list of the present group
+    int *seen = silt_borrow((size_t)n + 1, sizeof *seen); // 1 + the node's place in the list of the present group
     entry *list = NULL;
     int list_capacity = 0;
     memory->n_group = memory->n_exchange = 0;
@@ -338,9 +338,9 @@ static void book_groups(book *b) {
             memory->exchange[memory->n_exchange++] = (struct silt_share){list[k].node, list[k].before, list[k].change};
         memory->group_start[memory->n_group] = memory->n_exchange;
     }
-    free(start);
-    free(order);
-    free(seen);
+    silt_return(start);
+    silt_return(order);
+    silt_return(seen);
     free(list);
 }
 
@@ -349,9 +349,9 @@ void silt_book_volume(const silt_draft *draft, silt_nodes *nodes, silt_memory *m
     const silt_mesh *mesh = draft->mesh;
     const int n = nodes->count;
     book b = {.draft = draft, .nodes = nodes, .memory = memory, .was_wet = was_wet, .dim = mesh->dim, .size = size};
-    uint8_t *kept = silt_alloc((size_t)memory->n_cell + 1, 1);
-    b.wet = silt_alloc((size_t)n + 1, 1);
-    b.star = silt_alloc((size_t)n + 1, 1);
+    uint8_t *kept = silt_borrow((size_t)memory->n_cell + 1, 1);
+    b.wet = silt_borrow((size_t)n + 1, 1);
+    b.star = silt_borrow((size_t)n + 1, 1);
     memory->left = 0;
 
     // what went, what came, what was stretched
@@ -391,7 +391,7 @@ void silt_book_volume(const silt_draft *draft, silt_nodes *nodes, silt_memory *m
             b.made += moved;
         }
 
-    b.parent = silt_alloc((size_t)b.n_changed + (size_t)n + 1, sizeof *b.parent);
+    b.parent = silt_borrow((size_t)b.n_changed + (size_t)n + 1, sizeof *b.parent);
     for (int k = 0; k < b.n_changed + n; k++)
         b.parent[k] = k;
     book_facets(&b);
@@ -405,9 +405,9 @@ void silt_book_volume(const silt_draft *draft, silt_nodes *nodes, silt_memory *m
     }
     book_groups(&b);
     memory->reconnected = b.made + memory->left;
-    free(kept);
-    free(b.wet);
-    free(b.star);
+    silt_return(kept);
+    silt_return(b.wet);
+    silt_return(b.star);
     free(b.item);
-    free(b.parent);
+    silt_return(b.parent);
 }

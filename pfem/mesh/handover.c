@@ -255,12 +255,12 @@ void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, sil
                            const double *mass, const double *debt, const double *v, const int *map, double lost[3]) {
     const int dim = silt_nodes_dim(nodes), n = memory->n_node;
     ledger l = {.memory = memory, .mesh = mesh, .nodes = nodes, .v = v, .density = density, .dim = dim};
-    l.count = silt_alloc((size_t)n + 1, sizeof *l.count);
-    l.origin = silt_alloc((size_t)nodes->count + 1, sizeof *l.origin);
-    l.rest = silt_alloc((size_t)n + 1, sizeof *l.rest);
-    l.mass = silt_alloc((size_t)nodes->count + 1, sizeof *l.mass);
-    l.momentum = silt_alloc((size_t)(dim * nodes->count) + 1, sizeof *l.momentum);
-    l.result = silt_alloc((size_t)(dim * memory->n_exchange) + 1, sizeof *l.result);
+    l.count = silt_borrow((size_t)n + 1, sizeof *l.count);
+    l.origin = silt_borrow((size_t)nodes->count + 1, sizeof *l.origin);
+    l.rest = silt_borrow((size_t)n + 1, sizeof *l.rest);
+    l.mass = silt_borrow((size_t)nodes->count + 1, sizeof *l.mass);
+    l.momentum = silt_borrow((size_t)(dim * nodes->count) + 1, sizeof *l.momentum);
+    l.result = silt_borrow((size_t)(dim * memory->n_exchange) + 1, sizeof *l.result);
     for (int i = 0; i < n; i++)
         if (map[i] >= 0)
             l.origin[map[i]] = i;
@@ -296,8 +296,8 @@ void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, sil
         group_hand_on(&l, list, count, l.result + dim * first);
     }
     // parts of negative mass (debts) could carry a node's mean away: it stays in the ball about its parts' velocities
-    double *centre = silt_alloc((size_t)(dim * nodes->count) + 1, sizeof *centre);
-    double *radius = silt_alloc((size_t)nodes->count + 1, sizeof *radius);
+    double *centre = silt_borrow((size_t)(dim * nodes->count) + 1, sizeof *centre);
+    double *radius = silt_borrow((size_t)nodes->count + 1, sizeof *radius);
     for (int pass = 0; pass < 2; pass++)
         for (int k = 0; k < memory->n_exchange; k++) {
             const int i = memory->exchange[k].node, now = map[i];
@@ -322,15 +322,15 @@ void silt_momentum_hand_on(const silt_memory *memory, const silt_mesh *mesh, sil
         for (int d = 0; d < dim; d++)
             l.lost[d] += p[d] - l.mass[i] * at[d];
     }
-    free(centre);
-    free(radius);
+    silt_return(centre);
+    silt_return(radius);
     for (int d = 0; d < 3; d++)
         lost[d] = d < dim ? l.lost[d] : 0;
     free(list);
-    free(l.count);
-    free(l.origin);
-    free(l.rest);
-    free(l.mass);
-    free(l.momentum);
-    free(l.result);
+    silt_return(l.count);
+    silt_return(l.origin);
+    silt_return(l.rest);
+    silt_return(l.mass);
+    silt_return(l.momentum);
+    silt_return(l.result);
 }

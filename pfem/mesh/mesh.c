@@ -56,8 +56,8 @@ void silt_cell_facet(int dim, const int *cell, int a, int facet[3]) {
 void silt_cells_across(int dim, int n_node, int n_cell, const int (*cell)[4], int (*across)[4]) {
     // facets by their lowest node; of those only the other nodes have to be told apart
     silt_bins bins = silt_bins_create(n_node, n_cell);
-    uint64_t *key = silt_alloc((size_t)n_cell * (size_t)(dim + 1) + 1, sizeof *key);
-    int *item = silt_alloc((size_t)n_cell * (size_t)(dim + 1) + 1, sizeof *item);
+    uint64_t *key = silt_borrow((size_t)n_cell * (size_t)(dim + 1) + 1, sizeof *key);
+    int *item = silt_borrow((size_t)n_cell * (size_t)(dim + 1) + 1, sizeof *item);
     for (int pass = 0; pass < 2; pass++) {
         SILT_PRAGMA(omp parallel for schedule(static) num_threads(bins.n_part))
         for (int part = 0; part < bins.n_part; part++) {
@@ -106,8 +106,8 @@ void silt_cells_across(int dim, int n_node, int n_cell, const int (*cell)[4], in
         }
     }
     silt_bins_clear(&bins);
-    free(key);
-    free(item);
+    silt_return(key);
+    silt_return(item);
 }
 
 // true when a fixed node without walls of its own lies in the plane of a wall element, against the facet's length
@@ -261,10 +261,10 @@ static void connect_neighbours(silt_mesh *mesh, int n, int n_corner) {
     int *list[PARALLEL_MOST] = {mesh->neighbour}, capacity[PARALLEL_MOST] = {mesh->neighbour_capacity}, count[PARALLEL_MOST];
     SILT_PARALLEL(n)
     for (int part = 0; part < n_part; part++) {
-        int *seen = silt_alloc((size_t)n + 1, sizeof *seen);
+        int *seen = silt_borrow((size_t)n + 1, sizeof *seen);
         count[part] = connect_nodes(mesh, (int)((int64_t)n * part / n_part), (int)((int64_t)n * (part + 1) / n_part), n_corner, seen,
                                     &list[part], &capacity[part]);
-        free(seen);
+        silt_return(seen);
     }
     mesh->neighbour = list[0];
     mesh->neighbour_capacity = capacity[0];
@@ -295,7 +295,7 @@ void silt_mesh_connect_known(silt_mesh *mesh, const silt_nodes *nodes) {
 
     // a facet that only one cell has is boundary; in the order of their first nodes, in 3-D the lowest, then of the
     // cells
-    int *place = silt_alloc((size_t)n + 1, sizeof *place);
+    int *place = silt_borrow((size_t)n + 1, sizeof *place);
     for (int pass = 0; pass < 2; pass++) {
         for (int e = 0; e < mesh->n_cell; e++)
             for (int a = 0; a < n_corner; a++) {
@@ -325,7 +325,7 @@ void silt_mesh_connect_known(silt_mesh *mesh, const silt_nodes *nodes) {
             SILT_RESERVE(mesh->facet_kind, mesh->facet_kind_capacity, mesh->n_facet + 1);
         }
     }
-    free(place);
+    silt_return(place);
     SILT_PARALLEL(mesh->n_facet)
     for (int k = 0; k < mesh->n_facet; k++)
         mesh->facet_kind[k] = (uint8_t)silt_facet_kind_of(mesh, nodes, mesh->facet[k]);

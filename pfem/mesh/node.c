@@ -19,9 +19,10 @@ static void nodes_reserve(silt_nodes *nodes, int need) {
     const int dim = silt_nodes_dim(nodes);
     if (need <= nodes->capacity)
         return;
-    int capacity = nodes->capacity ? 2 * nodes->capacity : 256;
+    // of many a quarter more: room is memory
+    int capacity = nodes->capacity > 256 ? nodes->capacity : 256;
     while (capacity < need)
-        capacity *= 2;
+        capacity += capacity < 16384 ? capacity : capacity / 4;
 #define GROW(field, per)                                                                                               \
     do {                                                                                                               \
         int have = nodes->capacity * (per);                                                                            \
@@ -108,7 +109,7 @@ static void arrange(void *data, size_t size, int n, const int *order, char *spar
 void silt_nodes_arrange(silt_nodes *nodes, const int *order) {
     const int n = nodes->count;
     const size_t dim = (size_t)silt_nodes_dim(nodes);
-    char *spare = silt_alloc((size_t)n + 1, dim * sizeof(double));
+    char *spare = silt_borrow((size_t)n + 1, dim * sizeof(double));
     arrange(nodes->x, dim * sizeof *nodes->x, n, order, spare);
     arrange(nodes->v, dim * sizeof *nodes->v, n, order, spare);
     arrange(nodes->p, sizeof *nodes->p, n, order, spare);
@@ -121,7 +122,7 @@ void silt_nodes_arrange(silt_nodes *nodes, const int *order) {
     arrange(nodes->kind, sizeof *nodes->kind, n, order, spare);
     arrange(nodes->owner, sizeof *nodes->owner, n, order, spare);
     arrange(nodes->wall, sizeof *nodes->wall, n, order, spare);
-    free(spare);
+    silt_return(spare);
 }
 
 int silt_outline_points(int n, const double *outline, double h, double **xy) {

@@ -39,7 +39,7 @@ bool silt_nodes_order(const silt_mesh *mesh, const int *map, const silt_nodes *n
     for (int d = 1; d < dim; d++)
         axis = high[d] - low[d] > high[axis] - low[axis] ? d : axis;
     const int count = (int)silt_clamp((high[axis] - low[axis]) / h + 1, 1, n);
-    int *start = silt_alloc((size_t)count + 1, sizeof *start), *slab = silt_alloc((size_t)n + 1, sizeof *slab);
+    int *start = silt_borrow((size_t)count + 1, sizeof *start), *slab = silt_borrow((size_t)n + 1, sizeof *slab);
     for (int i = 0; i < n; i++) {
         slab[i] = (int)silt_clamp((nodes->x[dim * i + axis] - low[axis]) / h, 0, count - 1);
         start[slab[i] + 1]++;
@@ -48,15 +48,15 @@ bool silt_nodes_order(const silt_mesh *mesh, const int *map, const silt_nodes *n
         start[k + 1] += start[k];
     for (int i = 0; i < n; i++)
         order[start[slab[i]]++] = i;
-    free(start);
-    free(slab);
+    silt_return(start);
+    silt_return(slab);
     return true;
 }
 
 silt_bins silt_bins_create(int n_bin, int n_item) {
     silt_bins b = {.n_bin = n_bin, .n_item = n_item, .n_part = silt_threads(n_item / 4)};
-    b.start = silt_alloc((size_t)n_bin + 1, sizeof *b.start);
-    b.at = silt_alloc((size_t)n_bin * (size_t)b.n_part + 1, sizeof *b.at);
+    b.start = silt_borrow((size_t)n_bin + 1, sizeof *b.start);
+    b.at = silt_borrow((size_t)n_bin * (size_t)b.n_part + 1, sizeof *b.at);
     return b;
 }
 
@@ -75,8 +75,8 @@ void silt_bins_place(silt_bins *b) {
 }
 
 void silt_bins_clear(silt_bins *b) {
-    free(b->start);
-    free(b->at);
+    silt_return(b->at);
+    silt_return(b->start);
 }
 
 static int cell_lowest(int n_corner, const int *cell) {

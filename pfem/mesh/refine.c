@@ -1,5 +1,4 @@
 // the cloud's density: crowded nodes leave, stretched places get nodes
-#include "delaunay.h"
 #include "parallel.h"
 #include "remesh.h"
 
@@ -27,55 +26,11 @@ static const double refine_taut[4] = {0, 0, 1.5, 1.7}, refine_slack[4] = {0, 0, 
 // cells at the surface that are smaller than this times h^dim are films
 static const double refine_film[4] = {0, 0, 0.25, 0.068};
 
-void silt_memory_clear(silt_memory *memory) {
-    free(memory->cell);
-    free(memory->area);
-    free(memory->taken);
-    free(memory->taken_area);
-    free(memory->interior);
-    free(memory->dead);
-    free(memory->x);
-    free(memory->group_start);
-    free(memory->exchange);
-    silt_delaunay_free(&memory->kept);
-    *memory = (silt_memory){0};
-}
-
-void silt_memory_extend(silt_memory *memory, int n_node) {
-    SILT_RESERVE(memory->interior, memory->flag_capacity, n_node + 1);
-    SILT_RESERVE(memory->dead, memory->dead_capacity, n_node + 1);
-    for (int i = memory->n_node; i < n_node; i++)
-        memory->interior[i] = memory->dead[i] = 0;
-    memory->n_node = n_node;
-}
-
 static double cell_measure(const silt_mesh *mesh, const double *x, const int *cell) {
     if (mesh->dim != 3 && mesh->period[0] == 0)
         return silt_cell_area(x, cell);
     const silt_mesh one = {.dim = mesh->dim, .period = {mesh->period[0], mesh->period[1], mesh->period[2]}, .cell = (int(*)[4])cell};
     return silt_cell_volume(&one, x, 0);
-}
-
-void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nodes *nodes) {
-    memory->n_node = 0;
-    silt_memory_extend(memory, nodes->count);
-    SILT_RESERVE(memory->cell, memory->cell_capacity, mesh->n_cell + 1);
-    SILT_RESERVE(memory->area, memory->area_capacity, mesh->n_cell + 1);
-    memory->n_cell = mesh->n_cell;
-    memory->n_taken = 0;
-    SILT_PARALLEL(mesh->n_cell)
-    for (int e = 0; e < mesh->n_cell; e++) {
-        memcpy(memory->cell[e], mesh->cell[e], sizeof memory->cell[e]);
-        memory->area[e] = silt_cell_volume(mesh, nodes->x, e);
-    }
-    const int dim = silt_nodes_dim(nodes);
-    memory->dim = dim;
-    memcpy(memory->period, mesh->period, sizeof memory->period);
-    memory->n_place = nodes->count;
-    SILT_RESERVE(memory->x, memory->place_capacity, dim * nodes->count + 1);
-    memcpy(memory->x, nodes->x, (size_t)(dim * nodes->count) * sizeof *memory->x);
-    for (int i = 0; i < nodes->count; i++)
-        memory->interior[i] = i < mesh->n_node && mesh->wet[i] && !mesh->surface[i];
 }
 
 typedef struct candidate {
@@ -165,8 +120,8 @@ static void refine_sort(refinement *r) {
 
 static void refine_facets(refinement *r) {
     const silt_mesh *mesh = r->mesh;
-    r->facet_start = silt_alloc((size_t)mesh->n_node + 2, sizeof *r->facet_start);
-    r->facet = silt_alloc((size_t)(3 * mesh->n_facet) + 1, sizeof *r->facet);
+    r->facet_start = silt_borrow((size_t)mesh->n_node + 2, sizeof *r->facet_start);
+    r->facet = silt_borrow((size_t)(3 * mesh->n_facet) + 1, sizeof *r->facet);
     for (int pass = 0; pass < 2; pass++) {
         for (int k = 0; k < mesh->n_facet; k++)
             for (int a = 0; a < r->dim; a++) {
@@ -625,7 +580,7 @@ static void refine_stretched(refinement *r) {
     const silt_nodes *nodes = r->nodes;
     const int dim = r->dim;
     refine_propose_long(r);
-    r->fresh = silt_alloc((size_t)r->mesh->n_node + 1, sizeof *r->fresh);
+    r->fresh = silt_borrow((size_t)r->mesh->n_node + 1, sizeof *r->fresh);
     for (int i = 0; i < r->mesh->n_node; i++)
         r->fresh[i] = -1;
     for (int c = 0; c < r->n; c++) {
@@ -654,26 +609,26 @@ static void refine_stretched(refinement *r) {
         for (int m = 1; m < pieces; m++)
             refine_insert(r, a, b, (double)m / pieces, closed, around, n_around);
     }
-    free(r->fresh);
+    silt_return(r->fresh);
     free(r->fresh_next);
     free(r->fresh_node);
 }
 
 void silt_mesh_refine(const silt_mesh *mesh, silt_nodes *nodes, silt_memory *memory, double h) {
     refinement r = {.mesh = mesh, .nodes = nodes, .memory = memory, .walls = mesh->walls, .dim = silt_nodes_dim(nodes), .h = h};
-    r.locked = silt_alloc((size_t)mesh->n_node + 1, 1);
-    r.long_edge = silt_alloc((size_t)mesh->n_node + 1, 1);
+    r.locked = silt_borrow((size_t)mesh->n_node + 1, 1);
+    r.long_edge = silt_borrow((size_t)mesh->n_node + 1, 1);
     for (int i = 0; i < mesh->n_node; i++)
         r.locked[i] = memory->dead[i];
     refine_facets(&r);
     refine_crowded(&r);
     refine_flat(&r);
     refine_stretched(&r);
-    free(r.facet_start);
-    free(r.facet);
+    silt_return(r.facet_start);
+    silt_return(r.facet);
     free(r.list);
-    free(r.locked);
-    free(r.long_edge);
+    silt_return(r.locked);
+    silt_return(r.long_edge);
 }
 
 // ---- a test of remeshing

@@ -59,7 +59,7 @@ static void cell_key(const int cell[4], int key[4]) {
 void silt_cell_set_create(silt_cell_set *set, int n_node, int n, const int (*cell)[4]) {
     silt_bins bins = silt_bins_create(n_node, n);
     set->n_node = n_node;
-    set->item = silt_alloc((size_t)n + 1, sizeof *set->item);
+    set->item = silt_borrow((size_t)n + 1, sizeof *set->item);
     for (int pass = 0; pass < 2; pass++) {
         SILT_PRAGMA(omp parallel for schedule(static) num_threads(bins.n_part))
         for (int part = 0; part < bins.n_part; part++)
@@ -92,8 +92,8 @@ int silt_cell_set_find(const silt_cell_set *set, const int cell[4]) {
 }
 
 void silt_cell_set_clear(silt_cell_set *set) {
-    free(set->start);
-    free(set->item);
+    silt_return(set->item);
+    silt_return(set->start);
     *set = (silt_cell_set){0};
 }
 
@@ -422,7 +422,7 @@ static silt_status cloud_cells(const silt_mesh *mesh, const silt_nodes *nodes, c
     *n_cell = kept;
     *cells = NULL;
     if (!failed) {
-        *cells = silt_alloc((size_t)kept + 1, sizeof **cells);
+        *cells = silt_borrow((size_t)kept + 1, sizeof **cells);
         silt_cells_sort(nodes->count, n_corner, kept, found, *cells);
     }
     free(found);
@@ -578,7 +578,7 @@ silt_status silt_mesh_first(silt_mesh *mesh, const silt_nodes *nodes, const silt
         sliver[mesh->n_cell] = flat;
         silt_draft_push(&draft, cell, -1, shape.height / h);
     }
-    free(cells);
+    silt_return(cells);
     draft_finish(&draft, nodes, NULL, &sliver, barrier, scene->fluid.size);
     free(sliver);
     draft_clear(&draft);
@@ -667,9 +667,9 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
     double largest = 0;
 
     // old cells that the new triangulation has not: new cells in there are water too
-    uint8_t *stays = silt_alloc((size_t)memory->n_cell + 1, 1), *chosen = silt_alloc((size_t)n_cells + 1, 1);
-    int *before = silt_alloc((size_t)n_cells + 1, sizeof *before);
-    double *quality = silt_alloc((size_t)n_cells + 1, sizeof *quality);
+    uint8_t *stays = silt_borrow((size_t)memory->n_cell + 1, 1), *chosen = silt_borrow((size_t)n_cells + 1, 1);
+    int *before = silt_borrow((size_t)n_cells + 1, sizeof *before);
+    double *quality = silt_borrow((size_t)n_cells + 1, sizeof *quality);
     SILT_PARALLEL(n_cells)
     for (int e = 0; e < n_cells; e++) {
         before[e] = silt_cell_set_find(old, cells[e]);
@@ -685,7 +685,7 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
         }
     silt_locator locator = {0};
     silt_locator_build(&locator, &gone, nodes->x, scene->fluid.size);
-    int(*facet)[4] = silt_alloc((size_t)mesh->n_facet + 1, sizeof *facet);
+    int(*facet)[4] = silt_borrow((size_t)mesh->n_facet + 1, sizeof *facet);
     for (int k = 0; dim == 3 && k < mesh->n_facet; k++) {
         memcpy(facet[k], mesh->facet[k], sizeof mesh->facet[k]);
         facet[k][3] = -1;
@@ -714,17 +714,17 @@ static double choose_cells(silt_draft *draft, const silt_nodes *nodes, const sil
     silt_mesh_clear(&gone);
     silt_locator_clear(&locator);
     silt_cell_set_clear(&rim);
-    free(facet);
-    free(stays);
-    free(chosen);
-    free(before);
-    free(quality);
+    silt_return(facet);
+    silt_return(stays);
+    silt_return(chosen);
+    silt_return(before);
+    silt_return(quality);
     return largest;
 }
 
 // New numbers where the present ones lie across each other; the mesh's cells still have those before map.
 static void nodes_arrange(const silt_mesh *mesh, silt_nodes *nodes, double h, int n_before, int *map) {
-    int *order = silt_alloc((size_t)nodes->count + 1, sizeof *order), *number = silt_alloc((size_t)nodes->count + 1, sizeof *number);
+    int *order = silt_borrow((size_t)nodes->count + 1, sizeof *order), *number = silt_borrow((size_t)nodes->count + 1, sizeof *number);
     if (silt_nodes_order(mesh, map, nodes, h, order)) {
         silt_nodes_arrange(nodes, order);
         for (int k = 0; k < nodes->count; k++)
@@ -732,8 +732,8 @@ static void nodes_arrange(const silt_mesh *mesh, silt_nodes *nodes, double h, in
         for (int i = 0; i < n_before; i++)
             map[i] = map[i] < 0 ? -1 : number[map[i]];
     }
-    free(order);
-    free(number);
+    silt_return(order);
+    silt_return(number);
 }
 
 silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_scene *scene, const silt_barrier *barrier,
@@ -770,18 +770,18 @@ silt_status silt_mesh_rebuild(silt_mesh *mesh, silt_nodes *nodes, const silt_sce
         sliver = NULL;
         double largest;
         SILT_CLOCKED(decide, largest = choose_cells(&draft, nodes, scene, barrier, memory, &old, cells, n_cells, &sliver));
-        free(cells);
+        silt_return(cells);
         if (period <= 0 || 2 * largest <= margin || margin >= period)
             break;
     }
     memory->flat = draft_finish(&draft, nodes, nodes->x, &sliver, barrier, scene->fluid.size);
 
-    uint8_t *was_wet = silt_alloc((size_t)nodes->count + 1, 1);
+    uint8_t *was_wet = silt_borrow((size_t)nodes->count + 1, 1);
     for (int e = 0; e < memory->n_cell; e++)
         for (int a = 0; a <= dim; a++)
             was_wet[memory->cell[e][a]] = 1;
     SILT_CLOCKED(book, silt_book_volume(&draft, nodes, memory, &old, was_wet, scene->fluid.size));
-    free(was_wet);
+    silt_return(was_wet);
     silt_cell_set_clear(&old);
     free(sliver);
     draft_clear(&draft);

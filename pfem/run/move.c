@@ -333,7 +333,14 @@ static void potential_add(silt_run *run, double sign) {
             nodes->p[i] += sign * fluid->density * silt_formula_potential(&fluid->force, nodes->x + silt_nodes_dim(nodes) * i);
 }
 
-silt_status silt_run_move(silt_run *run, silt_error *err) {
+// n numbers a node, as they are now; to be returned
+static double *nodes_copy(const silt_nodes *nodes, int n, const double *from) {
+    const size_t count = (size_t)n * (size_t)nodes->count;
+    double *copy = silt_borrow(count + 1, sizeof *copy);
+    return memcpy(copy, from, count * sizeof *copy);
+}
+
+static silt_status nodes_move(silt_run *run, silt_error *err) {
     const silt_scene *scene = run->scene;
     silt_nodes *nodes = &run->nodes;
     silt_mesh *mesh = &run->mesh;
@@ -384,33 +391,36 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     for (int k = D * n; k < D * nodes->count; k++)
         run->x_old[k] = nodes->x[k];
     remember_bed(run);
-    SILT_RESERVE(run->wall_before, run->wall_before_capacity, nodes->count + 1);
-    SILT_RESERVE(run->v_before, run->v_before_capacity, D * (nodes->count + 1));
+    int *wall_before = silt_borrow((size_t)nodes->count + 1, sizeof *wall_before); // first wall of every node before contact
+    double *v_before = nodes_copy(nodes, D, nodes->v);
     for (int i = 0; i < nodes->count; i++)
-        run->wall_before[i] = nodes->wall[i][0];
-    memcpy(run->v_before, nodes->v, (size_t)(D * nodes->count) * sizeof(double));
-    uint8_t *flying = silt_alloc((size_t)nodes->count + 1, 1);
+        wall_before[i] = nodes->wall[i][0];
+    uint8_t *flying = silt_borrow((size_t)nodes->count + 1, 1);
     for (int i = 0; i < n; i++)
         flying[i] = !mesh->wet[i];
     silt_walls_contact(&run->walls, nodes, run->x_old, run->memory.interior, flying, h);
-    free(flying);
-    hand_on_landing(run, run->wall_before, run->v_before);
+    silt_return(flying);
+    hand_on_landing(run, wall_before, v_before);
+    silt_return(v_before);
+    silt_return(wall_before);
     let_out(run);
     expel(run);
     SILT_CLOCKED(refine, silt_mesh_refine(mesh, nodes, &run->memory, h));
 
     silt_clock_to(CLOCK_index);
     SILT_RESERVE(run->map, run->map_capacity, nodes->count + 1);
-    SILT_RESERVE(run->v_before, run->v_before_capacity, D * (nodes->count + 1));
-    SILT_RESERVE(run->debt_before, run->debt_before_capacity, nodes->count + 1);
-    memcpy(run->v_before, nodes->v, (size_t)(D * nodes->count) * sizeof(double));
-    memcpy(run->debt_before, nodes->debt, (size_t)nodes->count * sizeof(double));
+    double *debt_before = nodes_copy(nodes, 1, nodes->debt);
+    v_before = nodes_copy(nodes, D, nodes->v);
     run->memory.record = true;
-    SILT_TRY(silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err));
-    potential_add(run, -1);
+    const silt_status status = silt_mesh_rebuild(mesh, nodes, scene, &run->barrier, &run->memory, run->map, err);
     double lost[3];
-    SILT_CLOCKED(handover,
-                 silt_momentum_hand_on(&run->memory, mesh, nodes, rho, NULL, run->debt_before, run->v_before, run->map, lost));
+    if (status == SILT_OK) {
+        potential_add(run, -1);
+        SILT_CLOCKED(handover, silt_momentum_hand_on(&run->memory, mesh, nodes, rho, NULL, debt_before, v_before, run->map, lost));
+    }
+    silt_return(v_before);
+    silt_return(debt_before);
+    SILT_TRY(status);
     run->ledger.volume_reconnected += run->memory.reconnected;
     // without an outlet nothing may leave: what does anyway shows as a volume error
     if (scene->fluid.n_outlet)
@@ -423,4 +433,15 @@ silt_status silt_run_move(silt_run *run, silt_error *err) {
     silt_run_locate(run);
     silt_clock_to(CLOCK_rest);
     return SILT_OK;
+}
+
+// The factor of the pressure rests until the next step, and is larger than all that a new mesh needs for a moment (a tenth of the peak).
+silt_status silt_run_move(silt_run *run, silt_error *err) {
+    size_t bytes;
+    void *rest = silt_fluid_rest(&run->fluid, &bytes);
+    silt_lend(rest, bytes);
+    const silt_status status = nodes_move(run, err);
+    silt_memory_rest(&run->memory);
+    silt_lend(NULL, 0);
+    return status;
 }

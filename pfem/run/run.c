@@ -477,9 +477,6 @@ void silt_run_free(silt_run *run) {
     free(run->p_shown);
     free(run->v_old);
     free(run->debt_old);
-    free(run->wall_before);
-    free(run->v_before);
-    free(run->debt_before);
     free(run->map);
     free(run->out);
     free(run->worker);

@@ -114,10 +114,6 @@ struct silt_run {
     double body_error;             // what weight, contacts and water leave open of bodies' momentum, relative to them
     double *x_old;   // owned, 2 per node, positions at the start of the step
     double *v_old, *debt_old; // owned, 2 and 1 per node, velocities and debts at the start of the step
-    int *wall_before;  // owned, first wall of every node before contact
-    double *v_before;  // owned, 2 per node
-    double *debt_before; // owned, 1 per node
-    int wall_before_capacity, v_before_capacity, debt_before_capacity;
     int *map;        // owned, renumbering of the last rebuild
     double *p_old;   // owned, 1 per node, pressures at the start of the step: of the middle of the step before
     int n_old, n_shown; // nodes at the start of the step; nodes that p_shown is of, -1: of none
