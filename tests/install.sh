@@ -33,7 +33,7 @@ cat >"$work/project/CMakeLists.txt" <<END
 cmake_minimum_required(VERSION 3.25)
 project(steps LANGUAGES C)
 find_package(silt 0.1 REQUIRED)
-add_executable(steps $source/docs/example/steps.c)
+add_executable(steps "$source/docs/example/steps.c")
 target_link_libraries(steps PRIVATE silt::silt m)
 END
 cmake -S "$work/project" -B "$work/project/build" -DCMAKE_PREFIX_PATH="$work/moved" >"$work/cmake.log" 2>&1 &&

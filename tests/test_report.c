@@ -295,6 +295,30 @@ static void test_page(void **state) {
     free(page);
 }
 
+// from 1 m at 0 s to 4 m at 2 s: 2.5 m at 1 s; checks that ask for the same have one picture, with both names
+static void test_scalar_checks(void **state) {
+    (void)state;
+    silt_error err = {0};
+    make("scene.yaml", SCENE "  - {name: reach, column: front, scalar: reaches, level: 2.5, value: 1, tolerance: 1.0e-9}\n"
+                             "  - {name: early, column: front, scalar: at, at: 1, value: 2.5, tolerance: 1.0e-9}\n"
+                             "  - {name: top, column: front, scalar: max, value: 4, tolerance: 1.0e-9}\n"
+                             "  - {name: again, column: front, scalar: max, value: 4, tolerance: 1.0e-9}\n"
+                             "  - {name: wide, column: front, scalar: max, value: 4, tolerance: 0.1}\n");
+    make("curve.csv", "t,x\n0,1\n1,2.5\n2,4\n");
+    frames_make(3);
+    make("history.csv", "step,time,dt,n_node,volume_error,external_work,front,wall_mesh\n0,0,0,5,0,0,1,0.25\n1,2,2,5,0.001,-21,4,0.5\n");
+    if (silt_report(folder, &(silt_report_def){0}, NULL, &err))
+        fail_msg("%s", err.text);
+    char *page = page_read();
+    contains(page, "Checks: 7 of 7 pass");
+    contains(page, ">top, again<");
+    contains(page, ">wide<");
+    contains(page, ">reach<");
+    contains(page, ">early<");
+    assert_null(strstr(page, ">top, again, wide<"));
+    free(page);
+}
+
 static void test_view(void **state) {
     (void)state;
     silt_error err = {0};
@@ -363,7 +387,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_base64), cmocka_unit_test(test_plot_line), cmocka_unit_test(test_plot_thinned),
         cmocka_unit_test(test_plot_band), cmocka_unit_test(test_outside), cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_page), cmocka_unit_test(test_view),
+        cmocka_unit_test(test_page), cmocka_unit_test(test_scalar_checks), cmocka_unit_test(test_view),
     };
     const int failed = cmocka_run_group_tests(tests, make_folder, remove_folder);
     free(text);

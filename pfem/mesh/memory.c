@@ -67,7 +67,8 @@ void silt_memory_take(silt_memory *memory, const silt_mesh *mesh, const silt_nod
     memcpy(memory->period, mesh->period, sizeof memory->period);
     memory->n_place = nodes->count;
     memory->x = array_room(memory->x, &memory->place_capacity, dim * nodes->count + 1, sizeof *memory->x);
-    memcpy(memory->x, nodes->x, (size_t)(dim * nodes->count) * sizeof *memory->x);
+    if (nodes->count) // without nodes there may be no array of places
+        memcpy(memory->x, nodes->x, (size_t)(dim * nodes->count) * sizeof *memory->x);
     for (int i = 0; i < nodes->count; i++)
         memory->interior[i] = i < mesh->n_node && mesh->wet[i] && !mesh->surface[i];
 }

@@ -48,14 +48,15 @@ static silt_status study_folder(const char *out, silt_error *err) {
 
 // ---------------------------------------------------------------- the plan
 
-// text as one word of a shell
-static void plan_word(const char *text) {
+// text as one word of a shell, behind what leads it
+static void plan_word(const char *lead, const char *text) {
+    printf("%s", lead);
     if (*text &&
         strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./=+,:") == strlen(text)) {
-        printf(" %s", text);
+        printf("%s", text);
         return;
     }
-    printf(" '");
+    putchar('\'');
     for (; *text; text++)
         printf(*text == '\'' ? "'\\''" : "%c", *text);
     putchar('\'');
@@ -67,7 +68,7 @@ static void plan_place(const char *path) {
     char *made = full                    ? silt_text("%s", full)
                  : *path == '/' || !here ? silt_text("%s", path)
                                          : silt_text("%s/%s", here, path);
-    plan_word(made);
+    plan_word(" ", made);
     free(made);
     free(here);
     free(full);
@@ -78,13 +79,14 @@ static void study_plan(const study *s, const silt_study_def *def, const char *ou
     const ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
     self[n > 0 ? n : 0] = 0;
     for (int k = 0; k < study_count(s); k++) {
-        printf("%s study", n > 0 ? self : "silt");
+        plan_word("", n > 0 ? self : "silt");
+        printf(" study");
         plan_place(s->path);
         printf(" -q --run %d -o", k + 1);
         plan_place(out);
         for (int i = 0; i < def->n_set; i++) {
             printf(" -D");
-            plan_word(def->set[i]);
+            plan_word(" ", def->set[i]);
         }
         if (def->worker) {
             printf(" --worker");
