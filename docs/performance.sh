@@ -1,6 +1,6 @@
 #!/bin/sh
 # docs/performance.md: the tables of docs/performance.in.md measured anew, phases.csv and error-time.csv with their pictures too. The machine should be
-# quiet; about an hour and a half, and it goes on where it was stopped.
+# quiet; then it takes six minutes, and it goes on where it was stopped.
 # usage: performance.sh SILT OUT [small]
 #   OUT a folder for what was measured; small: one small size and few steps of each, the page goes to OUT: to try it
 set -u
