@@ -10,6 +10,7 @@
 #define CG_LIMIT    400
 #define SPACE_STIFF 1e-3 // of the viscous part of an increment, which others mend
 #define SPACE_GIVEN 1e8  // times the diagonal: a pressure that is given gets no increment
+#define SPACE_LIGHT 1e-6 // of a usual diagonal: a row of less has nothing but cells of rounding
 
 typedef float four __attribute__((vector_size(16))); // N_ij and L_ij of a node and its neighbour
 
@@ -21,6 +22,7 @@ struct silt_space {
     double *compact;       // owned, the same way, the preconditioner's matrix
     double *stiff;         // owned, the same way, L and what stands for viscosity; only where that is stiff
     double *extra;         // owned, per node: what pins closed water, on the diagonal
+    double size;           // m, of the scene's cells
     double *weight;        // owned, per cell: of L, and of L and S's Laplacian
     int *place;            // owned, per part and node: where it stands among the neighbours of the node at hand
     double *r, *ad;        // owned, per node, of conjugate gradients
@@ -164,6 +166,10 @@ static void rows_of_part(silt_space *q, const silt_fluid *f, const silt_mesh *me
         q->extra[i] = mesh->wet[i] ? (pinned[i] ? 1 : 1e-9) * compact[self] : 1;
         if (f->mobile[i] == MOBILE_SPRAY)
             q->extra[i] = SPACE_GIVEN * compact[self];
+        // beside a node that has slid into another one: its pressure would be rounding over rounding
+        const double usual = mesh->wet[i] ? f->tau[mesh->node_cell[mesh->node_cell_start[i]]] * q->size : 0;
+        if (mesh->wet[i] && !(compact[self] > SPACE_LIGHT * usual))
+            q->extra[i] = usual;
         compact[self] += q->extra[i];
         if (stiff && f->mobile[i] == MOBILE_SPRAY)
             q->stiff[first + self] *= SPACE_GIVEN;
@@ -211,6 +217,7 @@ silt_status silt_space_build(silt_space **space, const silt_fluid *f, const silt
     SILT_RESERVE(q->r, q->r_capacity, q->n + 1);
     SILT_RESERVE(q->ad, q->ad_capacity, q->n + 1);
     SILT_RESERVE(q->d, q->d_capacity, q->n + 1);
+    q->size = s->scene->fluid.size;
     rows_build(q, f, mesh, pinned, stiff);
     const int *start = mesh->neighbour_start, *index = mesh->neighbour;
     bool done;
