@@ -430,8 +430,8 @@ void silt_hold_bent(silt_fluid *f, const silt_step *s) {
 void silt_hold_light(silt_fluid *f, const silt_step *s) {
     const int D = f->dim;
     for (int i = 0; i < f->n_node; i++) {
-        const double h = silt_node_h(s->nodes, i, s->scene->fluid.size);
-        if (f->hold[i] == HOLD_FREE || f->hold[i] == HOLD_ALL || !s->mesh->wet[i] || !(f->volume[i] < HOLD_LIGHT * pow(h, D)))
+        if (f->hold[i] == HOLD_FREE || f->hold[i] == HOLD_ALL || !s->mesh->wet[i] ||
+            !(f->volume[i] < HOLD_LIGHT * pow(silt_node_h(s->nodes, i, s->scene->fluid.size), D)))
             continue;
         f->hold[i] = HOLD_ALL;
         memcpy(f->w + D * i, f->given + D * i, (size_t)D * sizeof(double));

@@ -427,7 +427,11 @@ static silt_status bodies_foreseen(silt_run *run, const double *force, silt_erro
         const struct silt_body *body = &bodies->body[b], *old = &run->body_before[b];
         silt_body_water *water = &run->body_water[b];
         double wrong = 0, all = 0;
-        for (int d = 0; d < 3 && water->known == 1 && silt_body_moves(&run->scene->body[b], d) && !silt_body_waits(run, b); d++) {
+        if (water->known != 1 || silt_body_waits(run, b))
+            continue;
+        for (int d = 0; d < 3; d++) {
+            if (!silt_body_moves(&run->scene->body[b], d))
+                continue;
             const double moved = (body->v[d] - old->v[d]) / run->dt;
             wrong += fabs(force[ROW * b + d] - body->force[d] + run->body_carry[b][d] / run->dt);
             all += fabs(moved) * (body->mass + run->body_inertia[(ROW * b + d) * (n + 1)]) + body->mass * fabs(run->scene->gravity[d]) + fabs(body->contact[d]) + fabs(body->force[d]);
